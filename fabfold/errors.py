@@ -1,0 +1,96 @@
+"""The exception tree of fabfold.
+
+.. code-block:: text
+
+    FabfoldError                     anything that fabfold itself reports   exit code
+    ├── InputError                   bad usage or bad input                     2
+    │   ├── ModelError               the 3D model cannot be used                2
+    │   ├── RecipeError              an option or recipe value is wrong         2
+    │   ├── TemplateError            the target shape cannot be used            2
+    │   └── KitError                 the kit folder is not what it should be    2
+    ├── NoSolutionError              the search ended with nothing that works   3
+    │   ├── NoVoxelsError            no grid placement fits the template        3
+    │   ├── NoTreeError              no tree fits the template                  3
+    │   └── NoFoldError              trees fit, but none could be folded        3
+    ├── CheckError                   a finished kit failed one of its checks    1
+    └── GeometryError                a geometric construction failed            1
+
+Every message says what is wrong, where, and what to do about it.
+"""
+
+from __future__ import annotations
+
+__all__ = [
+    "CheckError",
+    "FabfoldError",
+    "GeometryError",
+    "InputError",
+    "KitError",
+    "ModelError",
+    "NoFoldError",
+    "NoSolutionError",
+    "NoTreeError",
+    "NoVoxelsError",
+    "RecipeError",
+    "TemplateError",
+]
+
+
+class FabfoldError(Exception):
+    """Base of every error that fabfold reports on purpose.
+
+    Attributes
+    ----------
+    exit_code : int
+        What the command line returns for this error.
+    """
+
+    exit_code: int = 1
+
+
+class InputError(FabfoldError):
+    """The caller gave something that cannot be used."""
+
+    exit_code = 2
+
+
+class ModelError(InputError):
+    """The 3D model cannot be read, or is not one solid."""
+
+
+class RecipeError(InputError):
+    """An option of the recipe or the command line is wrong."""
+
+
+class TemplateError(InputError):
+    """The template (target shape) is unknown or malformed."""
+
+
+class KitError(InputError):
+    """The kit folder is missing something, or holds something else."""
+
+
+class NoSolutionError(FabfoldError):
+    """A search ended within its limits and found nothing."""
+
+    exit_code = 3
+
+
+class NoVoxelsError(NoSolutionError):
+    """No placement of the grid gives a voxelization that the template can hold."""
+
+
+class NoTreeError(NoSolutionError):
+    """No joint tree carries the voxels into the template."""
+
+
+class NoFoldError(NoSolutionError):
+    """Trees fit the template, but none survived folding on the real bodies."""
+
+
+class CheckError(FabfoldError):
+    """A finished kit failed one of its checks."""
+
+
+class GeometryError(FabfoldError):
+    """A geometric construction gave no valid solid."""

@@ -1,0 +1,1 @@
+"""Find and certify the folding path (paper section 5)."""

@@ -1,0 +1,1 @@
+"""Cut printed bodies with hinges from the voxels (paper section 4.3)."""

@@ -1,0 +1,63 @@
+"""The voxelized model: cells, their material, and the warped mesh they cut."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["SUBDIVISION", "Voxels"]
+
+#: Subvoxels along the side of a voxel (paper section 3: 20 x 20 x 20).
+SUBDIVISION = 20
+
+
+@dataclass(frozen=True)
+class Voxels:
+    """What the voxel stage hands on (paper section 3).
+
+    Everything is in lattice units of shape A: cell ``(i, j, k)`` is the cube of side 1 about the
+    point ``(i, j, k)``; subvoxel ``(a, b, c)`` of it is the cube of side 1/20 whose smallest
+    corner is ``(i, j, k) - 0.5 + (a, b, c) / 20``.
+
+    Attributes
+    ----------
+    cells : (n, 3) int32 array
+        Cells kept, sorted lexicographically, smallest coordinate 0 on every axis.
+    subvoxels : (n, 20, 20, 20) bool array
+        Material in each cell after the warp.
+    fill : (n,) float64 array
+        Share of each cell that is material (mean of `subvoxels`).
+    vertices : (v, 3) float64 array
+        The warped model in lattice units.
+    faces : (f, 3) int32 array
+        Its triangles; a closed, outward-oriented two-manifold.
+    rotation : (3, 3) float64 array
+        From model axes to lattice axes, before the warp.
+    origin : (3,) float64 array
+        The point that becomes lattice (0, 0, 0): lattice axes, model units.
+    pitch : float
+        Side of a voxel in model units.
+    plane_offsets : tuple of three (m,) float64 arrays
+        How far each grid plane of x, y and z was moved before the warp, in voxel sides.
+    lost_volume : float
+        Share of the model's volume in cells that were dropped.
+    energy : dict of str to float
+        The terms of the placement's score, by name (``"fullness"`` is Eq. 1).
+    """
+
+    cells: NDArray[np.int32]
+    subvoxels: NDArray[np.bool_]
+    fill: NDArray[np.float64]
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    rotation: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    pitch: float
+    plane_offsets: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+    lost_volume: float
+    energy: dict[str, float]
+
+    def __len__(self) -> int:
+        return len(self.cells)

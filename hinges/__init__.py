@@ -1,0 +1,1 @@
+"""Parametric print-in-place hinges for build123d and CadQuery."""
