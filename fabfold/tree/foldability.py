@@ -1,0 +1,53 @@
+"""What the tree search asks of the folding stage, without importing it."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.tree.system import HingeSystem
+
+__all__ = ["Foldability"]
+
+
+class Foldability(Protocol):
+    """Judge of hinge systems; every answer is deterministic for the same arguments."""
+
+    def stuck(self, system: HingeSystem) -> tuple[int, int]:
+        """Count hinges that the closure test cannot move.
+
+        A hinge is movable when every pair of bodies that blocks its first turn has an already
+        movable hinge on its tree path; the test repeats until nothing changes. It costs about
+        0.1 ms and is necessary, not sufficient.
+
+        Returns
+        -------
+        (int, int)
+            Hinges not movable from shape A, and from shape B.
+        """
+
+    def unresolved(self, system: HingeSystem, expansions: int) -> float:
+        """Share of the path that the planner could not find.
+
+        Parameters
+        ----------
+        system : HingeSystem
+        expansions : int
+            The planner gives up after this many expansions without progress.
+
+        Returns
+        -------
+        float
+            0.0 when it folds, up to 1.0 when nothing moves.
+        """
+
+    def path(self, system: HingeSystem) -> NDArray[np.int32] | None:
+        """Folding path after shortcutting, or None where the planner finds none.
+
+        Returns
+        -------
+        (m, 2) int32 array or None
+            One row a move, A to B: hinge index and signed quarter turns about its positive axis.
+        """
