@@ -1,0 +1,218 @@
+"""The command line: commands only, no logic; heavy imports stand inside the commands."""
+
+from __future__ import annotations
+
+import functools
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fabfold import __version__
+from fabfold.errors import FabfoldError
+
+if TYPE_CHECKING:
+    from fabfold.kit import Kit
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="fabfold",
+    help="Turn a 3D model into one printed object that folds into a box, and prove that it folds.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Source = Annotated[
+    str,
+    typer.Argument(
+        metavar="MODEL",
+        help="STL, OBJ, PLY, OFF, GLB, 3MF or STEP file; sample:NAME; a kit.toml; or a kit folder.",
+        show_default=False,
+    ),
+]
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", metavar="KIT", help="Kit folder. Default: NAME-kit."),
+]
+TemplateName = Annotated[
+    str | None,
+    typer.Option(
+        "--template",
+        "-t",
+        help="Target shape: box-AxBxC, a name of 'fabfold list templates', or a .toml file. "
+        "Default: the sample's own, else box-4x4x4.",
+    ),
+]
+VoxelMm = Annotated[
+    float | None, typer.Option("--voxel-mm", help="Printed side of a voxel in mm. Default: 20.")
+]
+ProfileName = Annotated[
+    str | None,
+    typer.Option(
+        "--profile",
+        help="Printer and material: a name of 'fabfold list profiles', or a .toml file.",
+    ),
+]
+ClearanceMm = Annotated[
+    float | None,
+    typer.Option("--clearance-mm", help="Gap in hinges and between faces. Default: the profile's."),
+]
+Seed = Annotated[
+    int | None, typer.Option("--seed", help="Seed of every random choice. Default: 1.")
+]
+Effort = Annotated[
+    str | None, typer.Option("--effort", help="quick, normal (default) or thorough search.")
+]
+Rounds = Annotated[
+    int | None, typer.Option("--rounds", help="Rounds of seeds before giving up. Default: 8.")
+]
+Rotation = Annotated[
+    str | None,
+    typer.Option(
+        "--rotation", metavar="X,Y,Z", help="Turn the model by hand, degrees about x, y, z."
+    ),
+]
+Origin = Annotated[
+    str | None,
+    typer.Option(
+        "--origin",
+        metavar="X,Y,Z",
+        help="Corner of the grid by hand, in model units after the rotation.",
+    ),
+]
+Pitch = Annotated[float | None, typer.Option("--pitch", help="Voxel side by hand, in model units.")]
+DropBelow = Annotated[
+    float | None,
+    typer.Option(
+        "--drop-below", help="Drop cells with less material than this share. Default: 0.04."
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", "-j", help="Processes of the search. Default: one a core. Changes no result."
+    ),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")]
+
+
+def _guarded(command: Callable[..., None]) -> Callable[..., None]:
+    """Turn what fabfold reports, and Ctrl-C, into one sentence and an exit code."""
+
+    @functools.wraps(command)
+    def run(*args: Any, **kwargs: Any) -> None:
+        try:
+            command(*args, **kwargs)
+        except FabfoldError as error:
+            typer.echo(f"fabfold: {error}", err=True)
+            raise typer.Exit(error.exit_code) from None
+        except KeyboardInterrupt:
+            typer.echo(
+                "fabfold: stopped; what is done is kept, the same command goes on from there",
+                err=True,
+            )
+            raise typer.Exit(130) from None
+
+    return run
+
+
+def _triple(text: str | None, option: str) -> tuple[float, float, float] | None:
+    if text is None:
+        return None
+    from fabfold.errors import RecipeError
+
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise RecipeError(f"{option} wants three numbers such as 0,90,0, found {text!r}") from None
+    return (x, y, z)
+
+
+def _kit(source: str, output: Path | None, workers: int | None, quiet: bool, **options: Any) -> Kit:
+    from fabfold.console import ConsoleListener
+    from fabfold.kit import open_kit
+
+    for name in ("rotation", "origin"):
+        options[name] = _triple(options[name], f"--{name}")
+    kit = open_kit(source, folder=output, workers=workers, **options)
+    if not quiet:
+        kit.listener = ConsoleListener()
+    return kit
+
+
+def _stage(name: str, summary: str) -> None:
+    """Register the command of one stage; all take the same options."""
+
+    def command(
+        source: Source,
+        output: Output = None,
+        template: TemplateName = None,
+        voxel_mm: VoxelMm = None,
+        profile: ProfileName = None,
+        clearance_mm: ClearanceMm = None,
+        seed: Seed = None,
+        effort: Effort = None,
+        rounds: Rounds = None,
+        drop_below: DropBelow = None,
+        rotation: Rotation = None,
+        origin: Origin = None,
+        pitch: Pitch = None,
+        workers: Workers = None,
+        quiet: Quiet = False,
+    ) -> None:
+        options = dict(locals())
+        for key in ("name", "summary"):
+            options.pop(key, None)
+        kit = _kit(**options)
+        kit.run(name)
+        from fabfold.console import show_result
+
+        show_result(kit, name)
+
+    command.__name__ = name
+    app.command(name, help=summary)(_guarded(command))
+
+
+_stage("voxelize", "Cut the model into voxels.")
+_stage("fit", "Find joint trees that carry the voxels into the template and fold.")
+_stage("fold", "Certify a folding path of the best tree on the lattice.")
+_stage("join", "Cut the printed bodies with their hinges, and certify the path on them.")
+_stage("check", "Check the printed bodies and replay the folding.")
+_stage("export", "Make the whole kit: 3MF, STEP, STL, animation and report.")
+
+
+@app.command("list")
+@_guarded
+def list_things(
+    what: Annotated[str, typer.Argument(help="samples, templates or profiles.")],
+) -> None:
+    """List the built-in samples, templates or profiles."""
+    from fabfold.console import show_list
+
+    show_list(what)
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"fabfold {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit with 0, 1, 2, 3 or 130 (see ``fabfold.errors``)."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    app(args=arguments)

@@ -1,0 +1,129 @@
+"""What the command line shows: progress while a stage runs, and its result."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as RichProgress
+from rich.table import Table
+
+from fabfold.errors import RecipeError
+from fabfold.progress import Progress
+
+if TYPE_CHECKING:
+    from fabfold.kit import Kit
+
+__all__ = ["ConsoleListener", "show_list", "show_result"]
+
+_TITLES = {
+    "solid": "Reading the model",
+    "voxelize": "Cutting voxels",
+    "fit": "Finding trees that fold",
+    "fold": "Certifying the path",
+    "join": "Making bodies and hinges",
+    "check": "Checking",
+    "export": "Writing the kit",
+}
+
+
+class ConsoleListener:
+    """Shows a bar a stage on a terminal, and a line a stage elsewhere."""
+
+    def __init__(self) -> None:
+        self.console = Console(stderr=True)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Progress]:
+        """Show the progress of one stage while the context is open."""
+        title = _TITLES.get(name, name)
+        start = time.monotonic()
+        if self.console.is_terminal:
+            bar = RichProgress(
+                TextColumn("{task.fields[title]:24}"),
+                BarColumn(bar_width=24),
+                TimeElapsedColumn(),
+                TextColumn("{task.description}"),
+                console=self.console,
+            )
+            with bar:
+                live = _LiveBar(bar, title)
+                yield live
+                live.done()
+        else:
+            plain = _LastMessage()
+            yield plain
+            seconds = time.monotonic() - start
+            self.console.print(
+                f"{title:24} {seconds:6.1f} s  {plain.message}", highlight=False, soft_wrap=True
+            )
+
+
+class _LiveBar:
+    def __init__(self, bar: RichProgress, title: str) -> None:
+        self._bar = bar
+        self._task = bar.add_task("", title=title, total=None)
+
+    def update(self, share: float | None, message: str = "") -> None:
+        if share is None:
+            self._bar.update(self._task, description=message)
+        else:
+            self._bar.update(self._task, total=1.0, completed=share, description=message)
+
+    def done(self) -> None:
+        self._bar.update(self._task, total=1.0, completed=1.0)
+
+
+class _LastMessage:
+    message = ""
+
+    def update(self, share: float | None, message: str = "") -> None:
+        if message:
+            self.message = message
+
+
+def show_result(kit: Kit, stage: str) -> None:
+    """Print what `stage` found, and where its files are."""
+    console = Console()
+    for line in kit.summary(stage):
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def show_list(what: str) -> None:
+    """Print the samples, templates or profiles there are.
+
+    Raises
+    ------
+    RecipeError
+        If `what` is none of the three.
+    """
+    console = Console()
+    if what == "samples":
+        from fabfold.solid.samples import SAMPLES
+
+        table = Table("sample", "template", "what it is", box=None)
+        for name, sample in SAMPLES.items():
+            table.add_row(f"sample:{name}", sample.template, sample.description)
+    elif what == "templates":
+        from fabfold.lattice import load_template, template_names
+
+        table = Table("template", "cells", box=None)
+        table.add_row("box-AxBxC", "any size: A × B × C")
+        for name in template_names():
+            table.add_row(name, str(len(load_template(name))))
+    elif what == "profiles":
+        from fabfold.printing.profiles import load_profile, profile_names
+
+        table = Table("profile", "process", "clearance", "what it is", box=None)
+        for name in profile_names():
+            profile = load_profile(name)
+            table.add_row(
+                name, profile.process, f"{profile.clearance_mm:g} mm", profile.description
+            )
+    else:
+        raise RecipeError(f"cannot list {what!r}: there are samples, templates and profiles")
+    console.print(table)
