@@ -1,0 +1,181 @@
+"""Clearances: how much room moving printed surfaces need.
+
+A clearance here is always measured *normal* to the two surfaces that face one another. For a cone
+pin this matters: a gap of 0.2 mm along the axis of a 45° cone is only 0.14 mm across it.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from .errors import HingeError
+
+__all__ = ["PROCESSES", "Clearance", "Process", "millimetres"]
+
+_UNITS: Final[dict[str, float]] = {
+    "mm": 1.0,
+    "um": 0.001,
+    "µm": 0.001,
+    "μm": 0.001,
+    "cm": 10.0,
+    "in": 25.4,
+    '"': 25.4,
+    "thou": 0.0254,
+    "mil": 0.0254,
+}
+_LENGTH: Final = re.compile(
+    r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*([a-zµμ\"]*)\s*$", re.I
+)
+
+
+def millimetres(value: float | str) -> float:
+    """Read a length: a number is in mm, a text may name its unit.
+
+    Parameters
+    ----------
+    value : float or str
+        ``0.3``, ``"0.3 mm"``, ``"300 um"``, ``"12 thou"`` or ``"0.012 in"``.
+
+    Returns
+    -------
+    float
+        In mm.
+
+    Raises
+    ------
+    HingeError
+        If the text is no length or its unit is unknown.
+
+    Examples
+    --------
+    >>> millimetres("300 um")
+    0.3
+    >>> round(millimetres("12 thou"), 4)
+    0.3048
+    """
+    if not isinstance(value, str):
+        return float(value)
+    found = _LENGTH.match(value)
+    unit = found.group(2).lower() or "mm" if found else ""
+    if found is None or unit not in _UNITS:
+        known = ", ".join(name for name in _UNITS if name not in ('"', "μm"))
+        raise HingeError(f"length {value!r} cannot be read: write a number and one of {known}")
+    return round(float(found.group(1)) * _UNITS[unit], 12)
+
+
+@dataclass(frozen=True)
+class Process:
+    """What one printing process needs between surfaces that must not fuse.
+
+    Attributes
+    ----------
+    name : str
+        Short name.
+    radial, axial : float
+        Default clearances in mm, per side, normal to the surface.
+    low, high : float
+        Range that makers and vendors report for printed-in-place joints, in mm.
+    wall : float
+        Thinnest wall in mm that carries load.
+    source : str
+        Where the figures come from.
+    """
+
+    name: str
+    radial: float
+    axial: float
+    low: float
+    high: float
+    wall: float
+    source: str
+
+
+PROCESSES: Final[dict[str, Process]] = {
+    process.name: process
+    for process in (
+        Process("fdm", 0.30, 0.30, 0.30, 0.50, 0.80, "makers' reports: 0.3 to 0.5 a side"),
+        Process("sla", 0.25, 0.25, 0.20, 0.30, 0.60, "makers' reports: 0.2 to 0.3 a side"),
+        Process("sls", 0.60, 0.60, 0.50, 0.60, 0.80, "makers' reports: 0.6 a side"),
+        Process("mjf", 0.50, 0.50, 0.40, 0.60, 0.80, "makers' reports: 0.4 to 0.6 in place"),
+        Process("polyjet", 0.35, 0.35, 0.30, 0.40, 0.80, "makers' reports: 0.3 to 0.4 a side"),
+    )
+}
+"""Defaults by process. Print a coupon (:class:`hinges.Coupon`) for a figure of your own."""
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """Room between the surfaces of a hinge that move past one another.
+
+    Parameters
+    ----------
+    radial : float or str
+        Between barrel and groove, pin and bore, cone and recess: always normal to the surface.
+        A number is in mm; a text may name its unit (``"300 um"``).
+    axial : float or str, optional
+        Between the flat ends of neighbouring knuckles; `radial` when left out.
+    source : str
+        Where the figure comes from; for reports.
+
+    Raises
+    ------
+    HingeError
+        If a value is not a finite positive length, or above 5 mm.
+
+    Examples
+    --------
+    >>> Clearance(0.3)
+    Clearance(radial=0.3, axial=0.3, source='given')
+    >>> Clearance.of("sls").radial
+    0.6
+    """
+
+    radial: float
+    axial: float = 0.0
+    source: str = "given"
+
+    def __init__(
+        self, radial: float | str, axial: float | str | None = None, source: str = "given"
+    ) -> None:
+        across = millimetres(radial)
+        along = across if axial is None else millimetres(axial)
+        for name, value in (("radial", across), ("axial", along)):
+            if not 0.0 < value <= 5.0:
+                raise HingeError(
+                    f"{name} clearance is {value} mm: give a length above 0 and up to 5 mm"
+                )
+        object.__setattr__(self, "radial", across)
+        object.__setattr__(self, "axial", along)
+        object.__setattr__(self, "source", source)
+
+    @classmethod
+    def of(cls, process: str) -> Clearance:
+        """Take the default of a printing process: fdm, sla, sls, mjf or polyjet.
+
+        Raises
+        ------
+        HingeError
+            If the process is unknown.
+        """
+        try:
+            found = PROCESSES[process.lower()]
+        except KeyError:
+            known = ", ".join(PROCESSES)
+            raise HingeError(f"process {process!r} is unknown: use one of {known}") from None
+        return cls(found.radial, found.axial, source=f"{found.name}: {found.source}")
+
+    @classmethod
+    def read(cls, value: Clearance | float | str) -> Clearance:
+        """Accept a `Clearance`, a number in mm, a length with a unit, or a process name."""
+        if isinstance(value, Clearance):
+            return value
+        if isinstance(value, str) and value.lower() in PROCESSES:
+            return cls.of(value)
+        return cls(value)
+
+    @property
+    def least(self) -> float:
+        """The smaller of the two, in mm: the gap that two halves keep at every angle."""
+        return min(self.radial, self.axial)
