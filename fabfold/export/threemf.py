@@ -1,0 +1,276 @@
+"""3MF: what goes to the slicer, with a name and a colour for each body.
+
+No one arrangement of objects is read as *one kit of named parts* by every slicer, so there are
+three, called layouts:
+
+``"assembly"``
+    One mesh object a body and one build item that holds them all as components, in their places.
+    This is how the 3MF core specification groups parts; Bambu Studio, OrcaSlicer, Cura and
+    Windows open it as one object of parts.
+``"merged"``
+    One mesh object that holds every body, with the bodies' triangle ranges and names in
+    ``Metadata/Slic3r_PE_model.config``. PrusaSlicer and SuperSlicer open it as one object of named
+    parts; they would take the components of an assembly apart into separate objects, most of them
+    afloat.
+``"apart"``
+    One mesh object and one build item a body: for bodies laid out on a plate.
+
+References
+----------
+3MF Core Specification 1.3, sections 4 and 5.
+"""
+
+from __future__ import annotations
+
+import io
+import uuid
+import zipfile
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.errors import GeometryError
+from fabfold.export.colours import palette
+from fabfold.export.weld import DECIMALS, printable_mesh
+from fabfold.files import replacing
+from fabfold.joinery.model import Joinery
+
+__all__ = ["Layout", "posed", "write_3mf"]
+
+Layout = Literal["assembly", "merged", "apart"]
+
+#: Metadata names that the core specification knows; all others get a name space of their own.
+_KNOWN = frozenset(
+    {
+        "Title",
+        "Designer",
+        "Description",
+        "Copyright",
+        "LicenseTerms",
+        "Rating",
+        "CreationDate",
+        "ModificationDate",
+        "Application",
+    }
+)
+_NAMESPACE = "urn:fabfold:kit"
+_RELATIONSHIP = "urn:fabfold:slicer-settings"
+_UNIT_MATRIX = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
+_Mesh = tuple[NDArray[np.float32], NDArray[np.int32]]
+
+
+def posed(joinery: Joinery, poses_mm: NDArray[np.float64]) -> Joinery:
+    """The same bodies, each moved from its place in shape A.
+
+    Parameters
+    ----------
+    joinery : Joinery
+    poses_mm : (b, 4, 4) float64 array
+        Rigid transform of each body, mm.
+
+    Returns
+    -------
+    Joinery
+        For a print pose or a plate.
+    """
+    bodies = tuple(
+        replace(body, vertices=body.vertices @ pose[:3, :3].T + pose[:3, 3])
+        for body, pose in zip(joinery.bodies, np.asarray(poses_mm, dtype=float), strict=True)
+    )
+    return replace(joinery, bodies=bodies)
+
+
+def write_3mf(
+    path: Path,
+    joinery: Joinery,
+    *,
+    title: str,
+    metadata: Mapping[str, str] | None = None,
+    colours: NDArray[np.uint8] | None = None,
+    layout: Layout = "assembly",
+) -> None:
+    """Write the bodies as one 3MF file; the same input gives the same bytes.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.3mf``.
+    joinery : Joinery
+        Bodies in the place where they are to be printed; see :func:`posed`.
+    title : str
+        Title of the file and name of the whole.
+    metadata : mapping of str to str, optional
+        Written as given. Names that the 3MF core specification does not know are put into the name
+        space ``urn:fabfold:kit``. ``Application`` is ``fabfold`` unless given.
+    colours : (b, 3) uint8 array, optional
+        sRGB, one a body.
+    layout : {"assembly", "merged", "apart"}
+        How the bodies are grouped; see the module's description.
+
+    Raises
+    ------
+    GeometryError
+        If a body does not stay closed in the file's precision, or lib3mf finds it not manifold.
+    """
+    import lib3mf
+
+    from fabfold import __version__
+
+    if colours is None:
+        colours = palette(len(joinery.bodies))
+    meshes = [printable_mesh(body) for body in joinery.bodies]
+    names = [body.name for body in joinery.bodies]
+    facts = {"Title": title, "Application": f"fabfold {__version__}", **(metadata or {})}
+    # UUIDs are made from the content's name, never drawn, so that two writes agree.
+    space = uuid.uuid5(uuid.NAMESPACE_URL, f"{_NAMESPACE}/{title}")
+
+    wrapper = lib3mf.get_wrapper()
+    model = wrapper.CreateModel()
+    model.SetUnit(lib3mf.ModelUnit.MilliMeter)
+    model.SetLanguage("en-US")
+    group = model.GetMetaDataGroup()
+    for key in sorted(facts):
+        group.AddMetaData("" if key in _KNOWN else _NAMESPACE, key, facts[key], "xs:string", True)
+    materials = model.AddBaseMaterialGroup()
+    paints = [
+        materials.AddMaterial(name, wrapper.RGBAToColor(*(int(c) for c in colour), 255))
+        for name, colour in zip(names, colours, strict=True)
+    ]
+    lowest = np.min([vertices.min(axis=0) for vertices, _ in meshes], axis=0)
+    place = _translation(lib3mf, -np.round(lowest.astype(float), DECIMALS))
+    model.SetBuildUUID(str(uuid.uuid5(space, "build")))
+    if layout == "merged":
+        whole = _add_merged(lib3mf, model, title, meshes, materials.GetResourceID(), paints)
+        whole.SetUUID(str(uuid.uuid5(space, "kit")))
+        settings = {"Slic3r_PE_model.config": _prusa_config(whole, title, names, meshes)}
+        tops = [whole]
+    else:
+        tops = []
+        for name, mesh, paint in zip(names, meshes, paints, strict=True):
+            body = _add_mesh(lib3mf, model, name, mesh)
+            body.SetObjectLevelProperty(materials.GetResourceID(), paint)
+            body.SetUUID(str(uuid.uuid5(space, name)))
+            tops.append(body)
+        settings = {}
+        if layout == "assembly":
+            whole = model.AddComponentsObject()
+            whole.SetName(title)
+            whole.SetUUID(str(uuid.uuid5(space, "kit")))
+            for name, body in zip(names, tops, strict=True):
+                component = whole.AddComponent(body, wrapper.GetIdentityTransform())
+                component.SetUUID(str(uuid.uuid5(space, f"component {name}")))
+            settings = {"model_settings.config": _bambu_config(whole, title, names, tops)}
+            tops = [whole]
+    for index, top in enumerate(tops):
+        item = model.AddBuildItem(top, place)
+        item.SetUUID(str(uuid.uuid5(space, f"item {index}")))
+    if settings:
+        model.AddCustomContentType("config", "text/xml")
+    for file_name, text in settings.items():
+        attachment = model.AddAttachment(f"/Metadata/{file_name}", _RELATIONSHIP)
+        attachment.ReadFromBuffer(text.encode("utf-8"))
+    writer = model.QueryWriter("3mf")
+    writer.SetDecimalPrecision(DECIMALS)
+    with replacing(path) as temporary:
+        writer.WriteToFile(str(temporary))
+        temporary.write_bytes(_repacked(temporary.read_bytes()))
+
+
+def _repacked(package: bytes) -> bytes:
+    """The same package with its content types first and valid dates (lib3mf writes month 0)."""
+    result = io.BytesIO()
+    with (
+        zipfile.ZipFile(io.BytesIO(package)) as old,
+        zipfile.ZipFile(result, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as new,
+    ):
+        for name in sorted(old.namelist(), key=lambda n: (n != "[Content_Types].xml", n)):
+            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 0
+            new.writestr(entry, old.read(name))
+    return result.getvalue()
+
+
+def _translation(lib3mf: Any, offset: NDArray[np.float64]) -> Any:
+    transform = lib3mf.Transform()
+    for row in range(3):
+        transform.Fields[row][row] = 1.0
+        transform.Fields[3][row] = float(offset[row])
+    return transform
+
+
+def _add_mesh(lib3mf: Any, model: Any, name: str, mesh: _Mesh) -> Any:
+    vertices, faces = mesh
+    target = model.AddMeshObject()
+    target.SetName(name)
+    points = np.ascontiguousarray(vertices, dtype="<f4")
+    corners = np.ascontiguousarray(faces, dtype="<u4")
+    target.SetGeometry(
+        (lib3mf.Position * len(points)).from_buffer_copy(points.tobytes()),
+        (lib3mf.Triangle * len(corners)).from_buffer_copy(corners.tobytes()),
+    )
+    if not target.IsManifoldAndOriented():
+        raise GeometryError(
+            f"{name}: lib3mf finds the mesh of {len(corners)} triangles not manifold and oriented; "
+            f"make the kit with another seed"
+        )
+    return target
+
+
+def _add_merged(
+    lib3mf: Any, model: Any, title: str, meshes: list[_Mesh], materials: int, paints: list[int]
+) -> Any:
+    starts = np.cumsum([0] + [len(vertices) for vertices, _ in meshes])
+    vertices = np.concatenate([vertices for vertices, _ in meshes])
+    faces = np.concatenate([faces + s for (_, faces), s in zip(meshes, starts, strict=False)])
+    whole = _add_mesh(lib3mf, model, title, (vertices, faces))
+    whole.SetObjectLevelProperty(materials, paints[0])
+    painted = np.repeat(paints, [len(faces) for _, faces in meshes])
+    record = np.empty((len(painted), 4), dtype="<u4")
+    record[:, 0] = materials
+    record[:, 1:] = painted[:, None]
+    properties = (lib3mf.TriangleProperties * len(record)).from_buffer_copy(record.tobytes())
+    whole.SetAllTriangleProperties(properties)
+    return whole
+
+
+def _prusa_config(whole: Any, title: str, names: list[str], meshes: list[_Mesh]) -> str:
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        "<config>",
+        f' <object id="{whole.GetModelResourceID()}" instances_count="1">',
+        f'  <metadata type="object" key="name" value={quoteattr(title)}/>',
+    ]
+    start = 0
+    for name, (_, faces) in zip(names, meshes, strict=True):
+        lines += [
+            f'  <volume firstid="{start}" lastid="{start + len(faces) - 1}">',
+            f'   <metadata type="volume" key="name" value={quoteattr(name)}/>',
+            '   <metadata type="volume" key="volume_type" value="ModelPart"/>',
+            f'   <metadata type="volume" key="matrix" value="{_UNIT_MATRIX}"/>',
+            "  </volume>",
+        ]
+        start += len(faces)
+    return "\n".join([*lines, " </object>", "</config>", ""])
+
+
+def _bambu_config(whole: Any, title: str, names: list[str], bodies: list[Any]) -> str:
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        "<config>",
+        f'  <object id="{whole.GetModelResourceID()}">',
+        f'    <metadata key="name" value={quoteattr(title)}/>',
+    ]
+    for name, body in zip(names, bodies, strict=True):
+        lines += [
+            f'    <part id="{body.GetModelResourceID()}" subtype="normal_part">',
+            f'      <metadata key="name" value={quoteattr(name)}/>',
+            f'      <metadata key="matrix" value="{_UNIT_MATRIX}"/>',
+            "    </part>",
+        ]
+    return "\n".join([*lines, "  </object>", "</config>", ""])
