@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fabfold import __version__
-from fabfold.errors import FabfoldError
+from fabfold.errors import CheckError, FabfoldError
 
 if TYPE_CHECKING:
     from fabfold.kit import Kit
@@ -139,6 +139,8 @@ def _kit(source: str, output: Path | None, workers: int | None, quiet: bool, **o
 
     for name in ("rotation", "origin"):
         options[name] = _triple(options[name], f"--{name}")
+    if output is None and not Path(source).is_dir():
+        output = Path(f"{Path(source.removeprefix('sample:')).stem}-kit")
     kit = open_kit(source, folder=output, workers=workers, **options)
     if not quiet:
         kit.listener = ConsoleListener()
@@ -173,6 +175,8 @@ def _stage(name: str, summary: str) -> None:
         from fabfold.console import show_result
 
         show_result(kit, name)
+        if name in ("check", "export") and not all(check.ok for check in kit.check()):
+            raise typer.Exit(CheckError.exit_code)
 
     command.__name__ = name
     app.command(name, help=summary)(_guarded(command))

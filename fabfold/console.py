@@ -88,9 +88,42 @@ class _LastMessage:
 
 def show_result(kit: Kit, stage: str) -> None:
     """Print what `stage` found, and where its files are."""
-    console = Console()
-    for line in kit.summary(stage):
-        console.print(line, highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True)
+    for line in _result_lines(kit, stage):
+        console.print(line, markup=False)
+
+
+def _result_lines(kit: Kit, stage: str) -> list[str]:
+    lines = [f"note: {note}" for note in kit.solid().notes]
+    if stage == "voxelize":
+        for index, voxels in enumerate(kit.voxelize()):
+            lines.append(
+                f"voxelization {index}: {len(voxels)} voxels, {voxels.fill.mean():.0%} full, "
+                f"smallest {voxels.fill.min():.0%}, {voxels.lost_volume:.1%} of the volume lost"
+            )
+        return lines
+    if stage in ("fit", "fold"):
+        tree, motion = kit.fold().tree, kit.fold().motion
+    else:
+        made = kit.join()
+        tree, motion = made.attempt.tree, made.attempt.motion
+    lines.append(
+        f"{len(tree.source)} voxels in {len(tree.bodies)} bodies, {len(tree.hinges)} hinges, "
+        f"folding into {tree.template.name} in {len(motion.moves) - 1} moves"
+    )
+    if motion.certificate:
+        lines.append(f"smallest gap on the whole path {motion.certificate['min_gap_mm']:.3f} mm")
+    if stage in ("check", "export"):
+        checks = kit.check()
+        bad = [check for check in checks if not check.ok]
+        lines += [
+            f"FAILED {check.name}: {check.figure:g} {check.unit}, limit {check.limit:g}: {check.note}"
+            for check in bad
+        ]
+        lines.append(f"{len(checks) - len(bad)} of {len(checks)} checks passed")
+    if kit.folder is not None:
+        lines.append(f"kit: {kit.folder}")
+    return lines
 
 
 def show_list(what: str) -> None:

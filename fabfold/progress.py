@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import Protocol
 
-__all__ = ["Progress", "SilentProgress"]
+__all__ = ["Listener", "Progress", "SilentListener", "SilentProgress"]
 
 
 class Progress(Protocol):
@@ -27,3 +29,19 @@ class SilentProgress:
 
     def update(self, share: float | None, message: str = "") -> None:
         """Do nothing."""
+
+
+class Listener(Protocol):
+    """Hears of each stage as it runs."""
+
+    def stage(self, name: str) -> AbstractContextManager[Progress]:
+        """Open the progress of the stage `name`."""
+
+
+class SilentListener:
+    """Hears nothing."""
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Progress]:
+        """Listen to nothing."""
+        yield SilentProgress()

@@ -64,6 +64,10 @@ class StageStore:
             raise KitError("this kit has no folder to keep stages in")
         return self.folder / name
 
+    def files(self, stage: str) -> list[str]:
+        """Names of the files that `stage` wrote, sorted."""
+        return sorted(self._journal[stage]["files"])
+
     def holds(self, stage: str, key: str) -> bool:
         """Whether `stage` was done with `key` and its files are as it left them."""
         entry = self._journal.get(stage)

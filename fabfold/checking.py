@@ -1,0 +1,88 @@
+"""Everything that is checked before a kit is written: bodies, certificate and replay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fabfold.attempt import Made
+from fabfold.fold.replay import replay
+from fabfold.printing.checks import Check, check_bodies
+from fabfold.printing.profiles import Profile
+from fabfold.progress import Progress
+from fabfold.tree.check import check_tree
+
+__all__ = ["run_checks"]
+
+#: Largest error of a hinge's angle at a keyframe of the replay, degrees.
+ANGLE_LIMIT_DEG = 1.0
+
+
+def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
+    """Check the tree, the certificate, the printed bodies and the replay.
+
+    Parameters
+    ----------
+    made : Made
+    profile : Profile
+        Limits of the printer and material.
+    progress : Progress
+
+    Returns
+    -------
+    list of Check
+        Each with its figure, limit, unit and verdict.
+    """
+    tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
+    faults = check_tree(tree)
+    certificate = motion.certificate
+    checks = [
+        Check(
+            name="tree folds the model into the template",
+            figure=float(len(faults)),
+            limit=0.0,
+            unit="faults",
+            ok=not faults,
+            note="; ".join(faults) or "forward kinematics puts every voxel into its cell",
+        ),
+        Check(
+            name="smallest gap on the folding path",
+            figure=float(certificate["min_gap_mm"]),
+            limit=profile.min_gap_mm,
+            unit="mm",
+            ok=certificate["min_gap_mm"] >= profile.min_gap_mm,
+            note=str(certificate["geometry"]),
+        ),
+        Check(
+            name="end of the path is the box",
+            figure=float(certificate["end_pose_error"]),
+            limit=1e-6,
+            unit="voxels",
+            ok=certificate["end_pose_error"] <= 1e-6,
+            note="largest distance of a voxel from its cell after the last move",
+        ),
+    ]
+    progress.update(0.1, "printability")
+    checks += check_bodies(joinery, tree, motion, profile, progress)
+    progress.update(0.6, "replay in MuJoCo")
+    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
+    report = replay(tree, motion, meshes, voxel_mm=joinery.voxel_mm, origin_mm=joinery.origin_mm)
+    checks += [
+        Check(
+            name="replay: deepest penetration",
+            figure=report.max_penetration_mm,
+            limit=joinery.clearance_mm,
+            unit="mm",
+            ok=report.max_penetration_mm <= joinery.clearance_mm,
+            note="bodies pushed by motors through the whole path in MuJoCo",
+        ),
+        Check(
+            name="replay: largest angle error",
+            figure=report.max_angle_error_deg,
+            limit=ANGLE_LIMIT_DEG,
+            unit="deg",
+            ok=bool(np.isfinite(report.max_angle_error_deg))
+            and report.max_angle_error_deg <= ANGLE_LIMIT_DEG,
+            note="at the end of any move",
+        ),
+    ]
+    return checks

@@ -1,0 +1,509 @@
+"""A kit: the stages from a model to print-ready files, in memory or in a folder.
+
+Data flows one way, solid → voxels → candidates → motion → joinery → report → files. Each stage is
+a method of :class:`Kit` that runs what is missing before it and returns a typed result. With a
+folder, every finished stage is kept there, and the same recipe goes on from what is done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold import __version__
+from fabfold.attempt import Attempt, Made
+from fabfold.errors import (
+    CheckError,
+    GeometryError,
+    KitError,
+    ModelError,
+    NoFoldError,
+    NoTreeError,
+)
+from fabfold.files import sha256_of, write_bytes, write_text
+from fabfold.lattice import Template, load_template, rotation_about
+from fabfold.progress import Listener, Progress, SilentListener
+from fabfold.recipe import Recipe, make_recipe, read_recipe
+from fabfold.store import StageStore, stage_key
+
+if TYPE_CHECKING:
+    from fabfold.printing.checks import Check
+    from fabfold.printing.profiles import Profile
+    from fabfold.solid.model import Solid
+    from fabfold.tree.solve import Candidate
+    from fabfold.voxels.model import Voxels
+
+__all__ = ["Kit", "open_kit"]
+
+Result = TypeVar("Result")
+
+#: Seeds in one round of the search; a constant, so that results do not depend on the workers.
+SEEDS_PER_ROUND = 4
+
+
+class Kit:
+    """One model on its way to a printed, folding object.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        Every choice that the result depends on.
+    model : Path or None
+        The model's file; None for a sample.
+    folder : Path or None
+        Kit folder that keeps finished stages; None works in memory until :meth:`export`.
+    workers : int or None
+        Processes of the search; None takes one a core. Changes no result.
+
+    Examples
+    --------
+    >>> from fabfold.kit import Kit
+    >>> kit = Kit.from_model("sample:car", seed=1)
+    >>> kit.recipe.template
+    'box-3x4x4'
+    """
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        *,
+        model: Path | None = None,
+        folder: Path | None = None,
+        workers: int | None = None,
+    ) -> None:
+        self.recipe = recipe
+        self.folder = folder
+        self.workers = workers
+        self.listener: Listener = SilentListener()
+        self._model = model
+        self._store = StageStore(folder)
+        self._results: dict[str, Any] = {}
+        self._template: Template = load_template(recipe.template)
+        if folder is not None:
+            _claim(folder)
+
+    @classmethod
+    def from_model(
+        cls,
+        model: str | Path,
+        *,
+        folder: str | Path | None = None,
+        workers: int | None = None,
+        **options: Any,
+    ) -> Kit:
+        """Kit of a model file or ``sample:NAME``; `options` are the fields of the recipe.
+
+        Raises
+        ------
+        ModelError
+            If there is no such file or sample.
+        RecipeError
+            If an option is wrong.
+        """
+        return open_kit(
+            str(model), folder=None if folder is None else Path(folder), workers=workers, **options
+        )
+
+    # Stages -----------------------------------------------------------------------------------
+
+    def solid(self) -> Solid:
+        """Closed manifold of the model (repaired where it could be)."""
+        from fabfold.solid import load
+        from fabfold.stagefiles import load_solid, save_solid
+
+        def make(progress: Progress) -> Solid:
+            progress.update(None, self.recipe.model)
+            source: str | Path = self.recipe.model
+            if self._model is not None:
+                source = self._keep_model(self._model)
+            solid = load.load_solid(source)
+            progress.update(1.0, f"{len(solid.faces)} triangles")
+            return solid
+
+        return self._stage(
+            "solid",
+            stage_key(__version__, self.recipe.model, self.recipe.sha256),
+            make,
+            save_solid,
+            load_solid,
+        )
+
+    def voxelize(self) -> list[Voxels]:
+        """Voxelizations of the model, best first (paper section 3)."""
+        from fabfold.stagefiles import load_options, save_options
+        from fabfold.voxels.search import voxelize
+
+        recipe = self.recipe
+        solid = self.solid()
+
+        def make(progress: Progress) -> list[Voxels]:
+            found = voxelize(
+                solid,
+                self._template,
+                seed=recipe.seed,
+                rotation=_rotation_matrix(recipe.rotation),
+                origin=recipe.origin,
+                pitch=recipe.pitch,
+                drop_below=recipe.drop_below,
+                progress=progress,
+            )
+            progress.update(1.0, f"{len(found[0])} voxels")
+            return found
+
+        return self._stage("voxelize", self._voxels_key(), make, save_options, load_options)
+
+    def fit(self) -> list[Candidate]:
+        """Trees that fold, best first (paper section 4), of the first round that finds any.
+
+        Raises
+        ------
+        NoTreeError, NoFoldError
+            If no round of the recipe finds one.
+        """
+        for _voxels, candidates in self._rounds():
+            return candidates
+        raise AssertionError("unreachable: rounds raise when they end")
+
+    def fold(self) -> Attempt:
+        """Best tree with its folding path, certified for ideal cubes (paper section 5)."""
+        result = self._results.get("fold")
+        if result is None:
+            result = next(self._attempts())
+            self._results["fold"] = result
+        return result
+
+    def join(self) -> Made:
+        """Printed bodies of the best tree that survives on them, with the final certificate.
+
+        Raises
+        ------
+        NoFoldError
+            If every tree of every round was refused; it says why.
+        """
+        from fabfold.stagefiles import load_made, save_made
+
+        profile = self.profile()
+
+        def make(progress: Progress) -> Made:
+            refused: list[str] = []
+            for attempt in self._attempts():
+                try:
+                    return self._build(attempt, profile, tuple(refused), progress)
+                except (GeometryError, CheckError) as error:
+                    refused.append(str(error))
+                    progress.update(None, f"tree {len(refused)} refused: {error}")
+            raise NoFoldError(
+                f"none of the {len(refused)} trees that fold as cubes could be built; "
+                f"the last one: {refused[-1]}. Try another --seed, a larger --voxel-mm or a "
+                "smaller --clearance-mm"
+            )
+
+        return self._stage("join", self._join_key(profile), make, save_made, load_made)
+
+    def check(self) -> list[Check]:
+        """Checks of the printed bodies and the replay of the path, each with figure and limit."""
+        from fabfold.checking import run_checks
+        from fabfold.stagefiles import load_checks, save_checks
+
+        profile = self.profile()
+        made = self.join()
+
+        def make(progress: Progress) -> list[Check]:
+            checks = run_checks(made, profile, progress)
+            bad = [check for check in checks if not check.ok]
+            progress.update(1.0, f"{len(checks) - len(bad)} of {len(checks)} passed")
+            return checks
+
+        return self._stage(
+            "check",
+            stage_key(self._join_key(profile), "check"),
+            make,
+            save_checks,
+            load_checks,
+        )
+
+    def export(self, folder: str | Path | None = None) -> Path:
+        """Write the files of the kit and return their folder.
+
+        Parameters
+        ----------
+        folder : path or None
+            Where to write; None is the kit's own folder.
+
+        Raises
+        ------
+        KitError
+            If there is no folder to write to, or it holds something else.
+        """
+        from fabfold.writing import write_kit
+
+        target = self.folder if folder is None else Path(folder)
+        if target is None:
+            raise KitError("where to? Give a folder to export to")
+        _claim(target)
+        profile = self.profile()
+        made = self.join()
+        checks = self.check()
+        with self.listener.stage("export") as progress:
+            write_kit(target, self.recipe, profile, self.solid(), made, checks, progress)
+        return target
+
+    def run(self, stage: str) -> None:
+        """Run one stage by name, with all before it that is missing, and write its kit files."""
+        from fabfold import writing
+
+        result = getattr(self, stage)()
+        if self.folder is None or stage in ("solid", "voxelize", "export"):
+            return
+        if stage == "fit":
+            result = self.fold()
+        if isinstance(result, Attempt):
+            writing.write_attempt(self.folder, result, self.recipe.voxel_mm)
+            return
+        made = self.join()
+        writing.write_made(self.folder, made)
+        if stage == "check":
+            writing.write_checks(self.folder, self.solid(), made, result)
+
+    # How the stages hang together ---------------------------------------------------------------
+
+    def profile(self) -> Profile:
+        """Printer profile, with the recipe's clearance where it gives one."""
+        from fabfold.printing.profiles import load_profile
+
+        profile = load_profile(self.recipe.profile)
+        if self.recipe.clearance_mm is not None:
+            profile = profile.model_copy(update={"clearance_mm": self.recipe.clearance_mm})
+        return profile
+
+    def _keep_model(self, model: Path) -> Path:
+        """Copy the model into the kit, so that ``kit.toml`` alone can make the kit again."""
+        if self._store.folder is None:
+            return model
+        kept = self._store.path("model") / self.recipe.model
+        if not (kept.is_file() and sha256_of(kept) == self.recipe.sha256):
+            write_bytes(kept, model.read_bytes())
+        return kept
+
+    def _voxels_key(self) -> str:
+        recipe = self.recipe
+        return stage_key(
+            __version__,
+            recipe.sha256 or recipe.model,
+            self._template.cells.tolist(),
+            recipe.seed,
+            [recipe.rotation, recipe.origin, recipe.pitch, recipe.drop_below],
+        )
+
+    def _join_key(self, profile: Profile) -> str:
+        recipe = self.recipe
+        return stage_key(
+            self._voxels_key(),
+            [recipe.surface_weight, recipe.single_weight, recipe.effort, recipe.rounds],
+            recipe.voxel_mm,
+            profile.model_dump(mode="json"),
+        )
+
+    def _rounds(self) -> Iterator[tuple[Voxels, list[Candidate]]]:
+        """Rounds of the search that found trees that fold; each takes the next voxelization."""
+        tried = 0
+        fitting = 0
+        why: NoTreeError | None = None
+        options = self.voxelize()
+        for number in range(self.recipe.rounds):
+            voxels = options[number % len(options)]
+            try:
+                candidates = self._round(number, voxels)
+            except NoTreeError as error:
+                why = error
+                continue
+            fitting += 1
+            if candidates:
+                tried += 1
+                yield voxels, candidates
+        if tried == 0 and fitting == 0 and why is not None:
+            raise why
+        if tried == 0:
+            raise NoFoldError(
+                f"no tree that folds in {self.recipe.rounds} rounds of {SEEDS_PER_ROUND} seeds; "
+                "try --effort thorough, more --rounds, another --seed or a larger template"
+            )
+
+    def _round(self, number: int, voxels: Voxels) -> list[Candidate]:
+        from fabfold.fold.foldability import LatticeFoldability
+        from fabfold.search import search
+        from fabfold.stagefiles import load_candidates, save_candidates
+        from fabfold.tree.problem import Weights, from_features
+        from fabfold.tree.solve import EFFORTS
+        from fabfold.voxels.features import features
+
+        recipe = self.recipe
+        name = f"fit-{number:02d}"
+        weights = Weights(surface=recipe.surface_weight, single=recipe.single_weight)
+
+        def make(progress: Progress) -> list[Candidate]:
+            problem = from_features(voxels, features(voxels), self._template, weights)
+            first = recipe.seed * 10_000 + number * SEEDS_PER_ROUND
+            return search(
+                problem,
+                range(first, first + SEEDS_PER_ROUND),
+                LatticeFoldability(),
+                EFFORTS[recipe.effort],
+                workers=self.workers,
+                progress=progress,
+            )
+
+        key = stage_key(
+            self._voxels_key(), recipe.surface_weight, recipe.single_weight, recipe.effort, number
+        )
+        return self._stage(name, key, make, partial(save_candidates, name), load_candidates)
+
+    def _attempts(self) -> Iterator[Attempt]:
+        """Every candidate of every round, best first, with its lattice path as a motion."""
+        from fabfold.fold.motion import motion_of
+
+        for voxels, candidates in self._rounds():
+            for candidate in candidates:
+                yield Attempt(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
+
+    def _build(
+        self, attempt: Attempt, profile: Profile, refused: tuple[str, ...], progress: Progress
+    ) -> Made:
+        from fabfold.fold.certify import certify
+        from fabfold.joinery.build import build_bodies
+
+        joinery = build_bodies(
+            attempt.voxels,
+            attempt.tree,
+            attempt.motion,
+            voxel_mm=self.recipe.voxel_mm,
+            clearance_mm=profile.clearance_mm,
+            progress=progress,
+        )
+        certificate = certify(
+            attempt.tree,
+            attempt.motion,
+            [(body.vertices, body.faces) for body in joinery.bodies],
+            voxel_mm=joinery.voxel_mm,
+            origin_mm=joinery.origin_mm,
+            min_gap_mm=profile.min_gap_mm,
+            progress=progress,
+        )
+        motion = replace(attempt.motion, certificate=certificate)
+        return Made(replace(attempt, motion=motion), joinery, refused)
+
+    def _stage(
+        self,
+        name: str,
+        key: str,
+        make: Callable[[Progress], Result],
+        save: Callable[[StageStore, Result], list[str]],
+        load: Callable[[StageStore, list[str]], Result],
+    ) -> Result:
+        """Result of a stage: from memory, from the kit folder, or made now and kept."""
+        if name in self._results:
+            result: Result = self._results[name]
+            return result
+        if self._store.holds(name, key):
+            result = load(self._store, self._store.files(name))
+        else:
+            if self.folder is not None:
+                write_text(self.folder / "kit.toml", self.recipe.to_toml())
+            with self.listener.stage(name) as progress:
+                result = make(progress)
+            if self._store.folder is not None:
+                self._store.record(name, key, save(self._store, result))
+        self._results[name] = result
+        return result
+
+
+def open_kit(
+    source: str, *, folder: Path | None = None, workers: int | None = None, **options: Any
+) -> Kit:
+    """Kit of a model file, ``sample:NAME``, a ``kit.toml`` or a kit folder.
+
+    Parameters
+    ----------
+    source : str
+    folder : Path or None
+        Kit folder; for a kit folder as `source` the default is that folder.
+    workers : int or None
+    **options
+        Fields of the recipe; those that are None keep the recipe's or the default value.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file or sample.
+    RecipeError
+        If the recipe or an option is wrong.
+    """
+    given = {key: value for key, value in options.items() if value is not None}
+    path = Path(source)
+    if path.is_dir():
+        if not (path / "kit.toml").is_file():
+            raise KitError(f"{path}: a folder without kit.toml is no kit; give a model file")
+        folder = path if folder is None else folder
+        path = path / "kit.toml"
+    if path.suffix == ".toml":
+        recipe = read_recipe(path)
+        recipe = make_recipe(**{**recipe.model_dump(), **given})
+        model = _find_model(recipe, path.parent)
+    elif source.startswith("sample:"):
+        from fabfold.solid.samples import sample
+
+        given.setdefault("template", sample(source.removeprefix("sample:")).template)
+        recipe, model = make_recipe(model=source, **given), None
+    else:
+        if not path.is_file():
+            raise ModelError(f"{source}: no such file (built-in samples are written sample:NAME)")
+        given.setdefault("template", "box-4x4x4")
+        recipe = make_recipe(model=path.name, sha256=sha256_of(path), **given)
+        model = path
+    return Kit(recipe, model=model, folder=folder, workers=workers)
+
+
+def _find_model(recipe: Recipe, beside: Path) -> Path | None:
+    """Model file of a recipe: beside it, kept in its stages, or in the working folder."""
+    if recipe.model.startswith("sample:"):
+        return None
+    for place in (beside, beside / "stages" / "model", Path()):
+        path = place / recipe.model
+        if path.is_file() and sha256_of(path) == recipe.sha256:
+            return path
+    raise ModelError(
+        f"{recipe.model}: not found with the digest {recipe.sha256[:12]}… beside the recipe in "
+        f"{beside} or in the working folder; put the model's file there"
+    )
+
+
+def _claim(folder: Path) -> None:
+    """Refuse a folder that holds something that is no kit."""
+    if folder.exists() and not folder.is_dir():
+        raise KitError(f"{folder}: is a file; give another folder for the kit")
+    if folder.is_dir():
+        names = {entry.name for entry in folder.iterdir()}
+        if names and not names & {"kit.toml", "stages"}:
+            raise KitError(
+                f"{folder}: holds files that are no kit; give another or an empty folder"
+            )
+
+
+def _rotation_matrix(
+    degrees: tuple[float, float, float] | None,
+) -> NDArray[np.float64] | None:
+    """Rotation about x, then y, then z of the fixed axes."""
+    if degrees is None:
+        return None
+    origin = np.zeros(3)
+    turns = [
+        rotation_about(origin, axis, angle)[:3, :3]
+        for axis, angle in zip(np.eye(3), degrees, strict=True)
+    ]
+    return turns[2] @ turns[1] @ turns[0]
