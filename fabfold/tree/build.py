@@ -1,0 +1,196 @@
+"""From poses to a :class:`~fabfold.tree.system.HingeSystem` and a finished tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.lattice import ROTATIONS
+from fabfold.tree.grow import energy_of
+from fabfold.tree.model import Body, Edge, FoldTree, Hinge
+from fabfold.tree.problem import TreeProblem
+from fabfold.tree.rebuild import FACE_ARRAY, candidates, rooted, spanning_tree
+from fabfold.tree.system import HingeSystem
+from fabfold.tree.wedge import half_turn_table, side_table
+
+__all__ = ["HingeChoice", "SpanningTree", "fold_tree", "hinge_choice"]
+
+
+@dataclass(frozen=True)
+class SpanningTree:
+    """A choice of hinges for a set of poses.
+
+    Attributes
+    ----------
+    system : HingeSystem
+        The bodies and hinges for the folding kernels.
+    joints : (h, 3) int32 array
+        Parent voxel, child voxel and joint type of each hinge.
+    """
+
+    system: HingeSystem
+    joints: NDArray[np.int32]
+
+    @property
+    def keys(self) -> set[tuple[int, int]]:
+        """Voxel pairs that carry a hinge, smaller voxel first."""
+        pairs = np.sort(self.joints[:, :2], axis=1)
+        return {(int(a), int(b)) for a, b in pairs}
+
+
+@dataclass(frozen=True)
+class HingeChoice:
+    """Rigid clusters of a set of poses and every hinge that could join them.
+
+    Attributes
+    ----------
+    problem : TreeProblem
+    label : (n,) int32 array
+        Cluster of each voxel.
+    clusters : int
+    found : (k, 12) int32 array
+        Possible hinges, see :func:`fabfold.tree.rebuild.candidates`.
+    """
+
+    problem: TreeProblem
+    label: NDArray[np.int32]
+    clusters: int
+    found: NDArray[np.int32]
+
+    def wanted(self, keys: set[tuple[int, int]], bonus: float) -> NDArray[np.float64]:
+        """Preference (smaller is sooner) for hinges between the voxel pairs of `keys`."""
+        return np.array(
+            [-bonus if (int(u), int(v)) in keys or (int(v), int(u)) in keys else 0.0
+             for u, v in self.found[:, :2]]
+        )
+
+    def tree(
+        self, wanted: NDArray[np.float64], generator: NDArray[np.uint64]
+    ) -> SpanningTree | None:
+        """One random spanning tree, or None where the hinges do not join all the clusters."""
+        hinges = self.clusters - 1
+        chosen = np.empty(hinges, np.int32)
+        if not spanning_tree(
+            self.found, len(self.found), self.clusters, wanted, generator, chosen
+        ):
+            return None
+        body = np.empty(len(self.label), np.int32)
+        parent, row = np.empty(hinges, np.int32), np.empty(hinges, np.int32)
+        axis, turns = np.empty(hinges, np.int8), np.empty(hinges, np.int8)
+        rooted(
+            self.found, chosen, self.label, self.clusters, side_table(), FACE_ARRAY,
+            body, parent, axis, turns, row,
+        )  # fmt: skip
+        from_v = row < 0
+        row = np.where(from_v, ~row, row)
+        u, v = self.found[row, 0], self.found[row, 1]
+        joints = np.stack(
+            [np.where(from_v, v, u), np.where(from_v, u, v), self.found[row, 5]], axis=1
+        )
+        system = HingeSystem(
+            cells=self.problem.source,
+            body=body,
+            parent=parent,
+            point2=np.ascontiguousarray(self.found[row, 6:9]),
+            axis=axis,
+            turns=turns,
+        )
+        return SpanningTree(system, joints)
+
+
+def hinge_choice(problem: TreeProblem, pose: NDArray[np.int32]) -> HingeChoice:
+    """Clusters and possible hinges of a full set of poses."""
+    label = np.empty(len(problem), np.int32)
+    found = np.empty((3 * len(problem), 12), np.int32)
+    total, rows = candidates(
+        problem.tables, pose, side_table(), FACE_ARRAY, half_turn_table(), label, found
+    )
+    return HingeChoice(problem, label, total, found[:rows])
+
+
+def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree) -> FoldTree:
+    """The finished tree of a set of poses and a choice of hinges.
+
+    Parameters
+    ----------
+    problem : TreeProblem
+    pose : (n,) int32 array
+        ``24 * template cell + rotation`` of each voxel.
+    tree : SpanningTree
+
+    Returns
+    -------
+    FoldTree
+    """
+    system = tree.system
+    bodies = len(system.parent) + 1
+    target = problem.template.cells[pose // 24].astype(np.int32)
+    orientation = ROTATIONS[pose % 24]
+    edges = _rigid_edges(problem, pose, system.body)
+    hinges = []
+    for h, (parent, child, _) in enumerate(tree.joints.tolist()):
+        edges.append(Edge(parent, child, "S", (h,)))
+        direction = [0, 0, 0]
+        direction[int(system.axis[h])] = 1
+        x, y, z = (system.point2[h] / 2.0).tolist()
+        hinges.append(
+            Hinge(
+                name=f"hinge-{h:02d}",
+                parent=int(system.parent[h]),
+                child=h + 1,
+                point=(x, y, z),
+                direction=(direction[0], direction[1], direction[2]),
+                angle_deg=90.0 * int(system.turns[h]),
+            )
+        )
+    first = int(np.flatnonzero(system.body == 0)[0])
+    root = orientation[first]
+    total, clusters = energy_of(problem.tables, pose, problem.empty_face)
+    count = problem.weights.single * (clusters - 1)
+    weight = problem.weights.surface
+    return FoldTree(
+        template=problem.template,
+        source=problem.source,
+        target=target,
+        orientation=orientation.astype(np.int32),
+        fill=problem.fill,
+        edges=tuple(edges),
+        bodies=tuple(
+            Body(f"body-{b:02d}", tuple(np.flatnonzero(system.body == b).tolist()))
+            for b in range(bodies)
+        ),
+        hinges=tuple(hinges),
+        root_rotation=root.astype(np.int32),
+        root_translation=(target[first] - root @ problem.source[first]).astype(np.int32),
+        energy={
+            "surface": float((total - count) / weight) if weight else 0.0,
+            "count": float(count),
+            "total": float(total),
+        },
+    )
+
+
+def _rigid_edges(
+    problem: TreeProblem, pose: NDArray[np.int32], body: NDArray[np.int32]
+) -> list[Edge]:
+    """Spanning forest of the rigid joints, breadth first from each body's first voxel."""
+    tables = problem.tables
+    seen = np.zeros(len(pose), dtype=bool)
+    edges: list[Edge] = []
+    for start in range(len(pose)):
+        if seen[start]:
+            continue
+        seen[start] = True
+        queue = [start]
+        for u in queue:
+            for face in range(6):
+                v = int(tables.neighbour[u, face])
+                if v < 0 or seen[v] or not tables.allowed[u, face, 0] or body[v] != body[u]:
+                    continue
+                if tables.step[face, 0, pose[u]] == pose[v]:
+                    seen[v] = True
+                    queue.append(v)
+                    edges.append(Edge(u, v, "R"))
+    return edges

@@ -1,0 +1,119 @@
+"""The joints between two voxels that share a face, derived from their geometry.
+
+A child cell stands beside its parent's face ``d``. A single hinge lies on one of the 4 edges of
+that face. A double hinge has a thin link plate in the face: axis 1 on one of its edges joins it to
+the parent, axis 2 on one of its edges joins it to the child. Every axis is a lattice edge, so any
+number of quarter turns carries the child to a lattice pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.lattice import FACES, rotation_about, rotation_index
+
+__all__ = ["Joint", "double_joints", "edge_sides", "face_transforms", "single_joints", "turn"]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint type across face `face` of the parent.
+
+    Attributes
+    ----------
+    kind : str
+        ``"R"``, ``"S"`` or ``"D"``.
+    face : int
+        Index in :data:`fabfold.lattice.FACES` of the parent's face that the child stands on.
+    sides : tuple of int
+        For each axis, which edge of the face it lies on: 0 to 3, see :func:`edge_sides`.
+    turns : tuple of int
+        For each axis, quarter turns (right-handed about ``FACES[face] x side``; a positive turn
+        opens the face and goes around the outside of the edge).
+    offset : tuple of int
+        Where the child's cell goes, relative to the parent's, in the parent's frame.
+    rotation : int
+        Index in :data:`fabfold.lattice.ROTATIONS` of the child's turn in the parent's frame.
+    """
+
+    kind: str
+    face: int
+    sides: tuple[int, ...]
+    turns: tuple[int, ...]
+    offset: tuple[int, int, int]
+    rotation: int
+
+
+def edge_sides(face: int) -> tuple[int, int, int, int]:
+    """The 4 in-plane directions of a face, as indices of ``FACES`` in ascending order.
+
+    Edge ``k`` of the face is the one towards ``FACES[edge_sides(face)[k]]``.
+    """
+    first, second, third, fourth = (f for f in range(6) if f >> 1 != face >> 1)
+    return (first, second, third, fourth)
+
+
+def turn(face: int, side: int, quarters: int) -> NDArray[np.float64]:
+    """Transform of a turn about edge `side` (0 to 3) of `face` of the cell at the origin.
+
+    Returns
+    -------
+    (4, 4) float64 array
+        Homogeneous transform in the parent's frame.
+    """
+    d = FACES[face]
+    n = FACES[edge_sides(face)[side]]
+    return rotation_about((d + n) / 2.0, np.cross(d, n), 90.0 * quarters)
+
+
+def _landing(face: int, transform: NDArray[np.float64]) -> tuple[tuple[int, int, int], int]:
+    moved = np.rint(transform[:3, :3] @ FACES[face] + transform[:3, 3]).astype(int)
+    x, y, z = moved.tolist()
+    return (x, y, z), rotation_index(transform[:3, :3])
+
+
+@cache
+def face_transforms(face: int) -> tuple[Joint, ...]:
+    """Every distinct transform that a link plate in `face` allows, fewest turning axes first.
+
+    There are 97: the rigid one, 12 of one axis (4 of them, the turns of 270 degrees, put the child
+    on its own parent) and 84 that need two real turns.
+    """
+    found: dict[tuple[tuple[int, int, int], int], Joint] = {}
+    cell, rotation = _landing(face, np.eye(4))
+    found[cell, rotation] = Joint("R", face, (), (), cell, rotation)
+    for side in range(4):
+        for quarters in (1, 2, 3):
+            cell, rotation = _landing(face, turn(face, side, quarters))
+            joint = Joint("S", face, (side,), (quarters,), cell, rotation)
+            found.setdefault((cell, rotation), joint)
+    for first in range(4):
+        for second in range(4):
+            for q1 in (1, 2, 3):
+                for q2 in (1, 2, 3):
+                    # Axis 2 rides on the link, hence stands on the right.
+                    transform = turn(face, first, q1) @ turn(face, second, q2)
+                    cell, rotation = _landing(face, transform)
+                    joint = Joint("D", face, (first, second), (q1, q2), cell, rotation)
+                    found.setdefault((cell, rotation), joint)
+    return tuple(found.values())
+
+
+@cache
+def single_joints(face: int, quarters: int = 2) -> tuple[Joint, ...]:
+    """The 4 single hinges of a face with the given turn, in the order of :func:`edge_sides`."""
+    return tuple(j for j in face_transforms(face) if j.kind == "S" and j.turns == (quarters,))
+
+
+@cache
+def double_joints(face: int, neighbours_only: bool = True) -> tuple[Joint, ...]:
+    """The double hinges of a face: 84, or the 32 that land on a face neighbour of the parent."""
+    return tuple(
+        j
+        for j in face_transforms(face)
+        if j.kind == "D" and (not neighbours_only or sum(map(abs, j.offset)) == 1)
+    )

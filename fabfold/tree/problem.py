@@ -1,0 +1,303 @@
+"""The tree search's input as plain arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.errors import NoTreeError
+from fabfold.lattice import FACES, ROTATION_PRODUCT, ROTATIONS, Template, parity
+from fabfold.tree.catalogue import Joint, single_joints
+
+if TYPE_CHECKING:
+    from fabfold.voxels.features import Features
+    from fabfold.voxels.model import Voxels
+
+__all__ = ["Tables", "TreeProblem", "Weights", "from_features", "joint_table", "tree_problem"]
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the energy (paper section 6)."""
+
+    surface: float = 0.3
+    rigid: float = 0.0
+    single: float = 0.1
+    double: float = 0.12
+
+
+class Tables(NamedTuple):
+    """What the kernels read. ``n`` voxels, ``m`` template cells, ``J`` joint types.
+
+    A pose is ``24 * cell + rotation`` with ``cell`` an index into the template's cells.
+
+    Attributes
+    ----------
+    neighbour : (n, 6) int32 array
+        Voxel across each face, -1 where there is none or no joint is possible.
+    allowed : (n, 6, J) bool array
+        Whether a joint type can be made there.
+    step : (6, J, 24 m) int32 array
+        Pose of the child from the face, the joint and the parent's pose; -1 outside the template.
+    weight : (J,) float64 array
+        Energy of each joint type.
+    surface : (n, 24, 64) float32 array
+        Weighted Eq. 8 of a voxel by its rotation and the exposed faces (bits) of its cell.
+    centre : (n, 64) float32 array
+        Expected `surface`, subtracted while states of unlike cells are compared.
+    exposed : (m,) uint8 array
+        Bit ``f`` set where the template ends at face ``f`` of a cell.
+    around : (m, 6) int32 array
+        Template cell across each face, -1 outside.
+    source : (n, 3) int32 array
+    cells : (m, 3) int32 array
+    rotations : (24, 3, 3) int32 array
+    """
+
+    neighbour: NDArray[np.int32]
+    allowed: NDArray[np.bool_]
+    step: NDArray[np.int32]
+    weight: NDArray[np.float64]
+    surface: NDArray[np.float32]
+    centre: NDArray[np.float32]
+    exposed: NDArray[np.uint8]
+    around: NDArray[np.int32]
+    source: NDArray[np.int32]
+    cells: NDArray[np.int32]
+    rotations: NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class TreeProblem:
+    """Voxels, the joints they allow, and the template they shall fill.
+
+    Attributes
+    ----------
+    template : Template
+    source : (n, 3) int32 array
+        Cells in shape A.
+    fill : (n,) float64 array
+        Share of each cell that is material.
+    weights : Weights
+    joints : tuple of J tuples of 6 Joint
+        Joint types by index, one for each face of the parent; index 0 is the rigid joint.
+    tables : Tables
+    """
+
+    template: Template
+    source: NDArray[np.int32]
+    fill: NDArray[np.float64]
+    weights: Weights
+    joints: tuple[tuple[Joint, ...], ...]
+    tables: Tables
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+    @property
+    def empty_face(self) -> float:
+        """Weighted surface energy of one boundary face of an empty template cell."""
+        return self.weights.surface
+
+    def colourings(self) -> list[int]:
+        """Colours (0, 1) of template cells that voxels of source colour 0 can take.
+
+        Rigid joints, 180° single hinges and double hinges onto a face neighbour keep the
+        checkerboard colouring.
+
+        Raises
+        ------
+        NoTreeError
+            If the colours of the voxels fit into the template in neither way.
+        """
+        odd = int(parity(self.source).sum())
+        voxels = (len(self.source) - odd, odd)
+        cells = self.template.colours
+        fits = [
+            c for c in (0, 1) if voxels[0] <= cells[c] and voxels[1] <= cells[1 - c]
+        ]
+        if not fits:
+            raise NoTreeError(
+                f"the voxels have {voxels[0]} cells of one checkerboard colour and {voxels[1]} of "
+                f"the other, template {self.template.name!r} has {cells[0]} and {cells[1]}: hinges "
+                "keep the colour of a cell, so no tree fits; take another voxelization or a "
+                "template with room for both colours"
+            )
+        return fits
+
+
+def joint_table(
+    template: Template, joints: Sequence[Sequence[Joint]]
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.uint8]]:
+    """Where joints carry a child, for every pose of the parent.
+
+    Returns
+    -------
+    step : (6, J, 24 m) int32 array
+    around : (m, 6) int32 array
+    exposed : (m,) uint8 array
+        As in :class:`Tables`.
+    """
+    cells = template.cells
+    pad = 2
+    grid = np.full(np.array(template.shape) + 2 * pad, -1, dtype=np.int32)
+    grid[tuple((cells + pad).T)] = np.arange(len(cells), dtype=np.int32)
+    step = np.full((6, len(joints), 24 * len(cells)), -1, dtype=np.int32)
+    parents = 24 * np.arange(len(cells), dtype=np.int32)
+    for index, by_face in enumerate(joints):
+        for face, joint in enumerate(by_face):
+            for rotation in range(24):
+                moved = cells + ROTATIONS[rotation] @ np.array(joint.offset, dtype=np.int32) + pad
+                landing = grid[tuple(moved.T)]
+                turned = ROTATION_PRODUCT[rotation, joint.rotation]
+                step[face, index, parents + rotation] = np.where(
+                    landing >= 0, 24 * landing + turned, -1
+                )
+    around = np.stack([grid[tuple((cells + d + pad).T)] for d in FACES], axis=1)
+    exposed = ((around < 0) << np.arange(6)).sum(axis=1).astype(np.uint8)
+    return step, np.ascontiguousarray(around), exposed
+
+
+def _surface_table(
+    depth: NDArray[np.float64], exposed: NDArray[np.uint8], weight: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    # Face f of the cell in B is face turned[r, f] of the voxel in A.
+    turned = np.array(
+        [[int(np.flatnonzero((FACES == d @ r).all(axis=1))[0]) for d in FACES] for r in ROTATIONS]
+    )
+    bits = (np.arange(64)[:, None] >> np.arange(6)) & 1
+    by_face = np.asarray(depth, dtype=float)[:, turned]
+    surface = weight * np.einsum("nrf,pf->nrp", by_face, bits)
+    by_pattern = surface.mean(axis=1)
+    pattern_mean = by_pattern.mean(axis=0)
+    voxel_mean = (by_pattern - pattern_mean)[:, exposed].mean(axis=1)
+    centre = pattern_mean[None, :] + voxel_mean[:, None]
+    return surface.astype(np.float32), centre.astype(np.float32)
+
+
+def tree_problem(
+    cells: NDArray[np.int32],
+    template: Template,
+    *,
+    pairs: NDArray[np.int32],
+    rigid: NDArray[np.bool_],
+    hinge: NDArray[np.bool_],
+    depth: NDArray[np.float64],
+    fill: NDArray[np.float64] | None = None,
+    weights: Weights | None = None,
+) -> TreeProblem:
+    """Problem from plain arrays; :func:`from_features` takes the voxel stage's results.
+
+    Parameters
+    ----------
+    cells : (n, 3) int array
+        Source cells.
+    template : Template
+    pairs : (k, 2) int array
+        Voxels ``i, j`` that share a face.
+    rigid : (k,) bool array
+        Whether the pair can be one printed piece.
+    hinge : (k, 4) bool array
+        Whether each edge of the shared face can hold a single hinge, in the order of
+        :func:`fabfold.tree.catalogue.edge_sides`.
+    depth : (n, 6) float array
+        Mean ray depth into each voxel from each of its faces, 0 to 1 (Eq. 8).
+    fill : (n,) float array, optional
+        Share of each cell that is material.
+    weights : Weights, optional
+
+    Raises
+    ------
+    NoTreeError
+        If there are more voxels than template cells, or no tree can join the voxels at all.
+    """
+    weights = weights or Weights()
+    cells = np.asarray(cells, dtype=np.int32).reshape(-1, 3)
+    count = len(cells)
+    if count == 0 or count > len(template):
+        raise NoTreeError(
+            f"{count} voxels cannot go into template {template.name!r} of {len(template)} cells: "
+            "take a larger template or a coarser grid"
+        )
+    rigid_joints = tuple(
+        Joint("R", face, (), (), tuple(FACES[face].tolist()), 0) for face in range(6)
+    )
+    sides = [single_joints(face) for face in range(6)]
+    joints = (rigid_joints, *(tuple(sides[face][k] for face in range(6)) for k in range(4)))
+    step, around, exposed = joint_table(template, joints)
+    neighbour = np.full((count, 6), -1, dtype=np.int32)
+    allowed = np.zeros((count, 6, len(joints)), dtype=bool)
+    for (i, j), stiff, edges in zip(pairs, rigid, hinge, strict=True):
+        face = int(np.flatnonzero((FACES == cells[j] - cells[i]).all(axis=1))[0])
+        # Both faces list the same edges in the same order, so one row serves either parent.
+        for parent, child, side in ((i, j, face), (j, i, face ^ 1)):
+            allowed[parent, side, 0] = stiff
+            allowed[parent, side, 1:5] = edges
+            if allowed[parent, side].any():
+                neighbour[parent, side] = child
+    _require_connected(neighbour)
+    surface, centre = _surface_table(depth, exposed, weights.surface)
+    tables = Tables(
+        neighbour=neighbour,
+        allowed=allowed,
+        step=step,
+        weight=np.array([weights.rigid, *([weights.single] * 4)]),
+        surface=surface,
+        centre=centre,
+        exposed=exposed,
+        around=around,
+        source=cells,
+        cells=template.cells,
+        rotations=ROTATIONS,
+    )
+    return TreeProblem(
+        template=template,
+        source=cells,
+        fill=np.ones(count) if fill is None else np.asarray(fill, dtype=float),
+        weights=weights,
+        joints=joints,
+        tables=tables,
+    )
+
+
+def from_features(
+    voxels: Voxels, features: Features, template: Template, weights: Weights | None = None
+) -> TreeProblem:
+    """Problem from a voxelization, its printable joints and a template.
+
+    Raises
+    ------
+    NoTreeError
+        As for :func:`tree_problem`.
+    """
+    return tree_problem(
+        voxels.cells,
+        template,
+        pairs=features.pairs,
+        rigid=features.rigid,
+        hinge=features.hinge,
+        depth=features.depth,
+        fill=voxels.fill,
+        weights=weights,
+    )
+
+
+def _require_connected(neighbour: NDArray[np.int32]) -> None:
+    seen = np.zeros(len(neighbour), dtype=bool)
+    seen[0] = True
+    queue = [0]
+    while queue:
+        for other in neighbour[queue.pop()].tolist():
+            if other >= 0 and not seen[other]:
+                seen[other] = True
+                queue.append(other)
+    if not seen.all():
+        raise NoTreeError(
+            f"{int((~seen).sum())} of {len(seen)} voxels (first: number "
+            f"{int(np.flatnonzero(~seen)[0])}) have no printable joint to the others: take "
+            "another voxelization, or a larger voxel"
+        )

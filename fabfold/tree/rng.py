@@ -1,0 +1,43 @@
+"""A tiny seeded generator for kernels (splitmix64), since numba's own is global state."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["generator", "mix", "random_below", "random_bits", "random_float"]
+
+
+def generator(seed: int) -> NDArray[np.uint64]:
+    """State for the kernels' random numbers, shape (1,) uint64."""
+    return np.random.SeedSequence(seed).generate_state(1, np.uint64)
+
+
+@njit(cache=True)
+def mix(value: np.uint64) -> np.uint64:
+    """Scramble 64 bits (splitmix64's finalizer): also the Zobrist key of a small integer."""
+    z = value + np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+@njit(cache=True)
+def random_bits(state: NDArray[np.uint64]) -> np.uint64:
+    """Next 64 random bits."""
+    out = mix(state[0])
+    state[0] = state[0] + np.uint64(0x9E3779B97F4A7C15)
+    return out
+
+
+@njit(cache=True)
+def random_float(state: NDArray[np.uint64]) -> float:
+    """Uniform in [0, 1)."""
+    return np.float64(random_bits(state) >> np.uint64(11)) * (1.0 / 9007199254740992.0)
+
+
+@njit(cache=True)
+def random_below(state: NDArray[np.uint64], bound: int) -> int:
+    """Uniform integer in [0, bound)."""
+    return np.int64(random_bits(state) >> np.uint64(33)) % np.int64(bound)

@@ -1,0 +1,200 @@
+"""Large-neighbourhood search: take some voxels out and put them back with the beam."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabfold.tree.grow import clusters, energy_of, fill_beam
+from fabfold.tree.problem import Tables
+from fabfold.tree.rebuild import connected
+from fabfold.tree.rng import random_below, random_float
+
+__all__ = ["propose", "ruin"]
+
+
+@njit(cache=True)
+def ruin(
+    tables: Tables,
+    pose: NDArray[np.int32],
+    label: NDArray[np.int32],
+    holder: NDArray[np.int32],
+    least: int,
+    most: int,
+    generator: NDArray[np.uint64],
+    out: NDArray[np.bool_],
+) -> int:
+    """Choose the voxels to take out.
+
+    Mostly the source neighbours of one rigid cluster and whatever sits in the cells that they
+    would take if they were rigid with it, which lets the cluster grow; else a connected patch of
+    the source, or of the template.
+
+    Parameters
+    ----------
+    label : (n,) int32 array
+        Rigid cluster of each voxel.
+    holder : (m,) int32 array
+        Voxel in each template cell, -1 for none.
+    least, most : int
+        Number of voxels wanted.
+    out : (n,) bool array
+        Filled with the choice.
+
+    Returns
+    -------
+    int
+        Number of voxels chosen.
+    """
+    count = len(pose)
+    out[:] = False
+    chosen = 0
+    want = least + random_below(generator, most - least + 1)
+    how = random_float(generator)
+    if how < 0.65:
+        here = label[random_below(generator, count)]
+        shift = random_below(generator, count)
+        for k in range(count):
+            u = (k + shift) % count
+            if label[u] != here:
+                continue
+            turn = random_below(generator, 6)
+            for i in range(6):
+                f = (i + turn) % 6
+                v = tables.neighbour[u, f]
+                if v < 0 or label[v] == here or out[v] or not tables.allowed[u, f, 0]:
+                    continue
+                q = tables.step[f, 0, pose[u]]
+                if q < 0:
+                    continue
+                sitting = holder[q // 24]
+                if sitting >= 0 and label[sitting] == here:
+                    continue
+                out[v] = True
+                chosen += 1
+                if sitting >= 0 and not out[sitting]:
+                    out[sitting] = True
+                    chosen += 1
+                if chosen >= want:
+                    return chosen
+        # The rest comes from the edges of what is already out.
+        if chosen >= least:
+            return chosen
+    first = random_below(generator, count)
+    if not out[first]:
+        out[first] = True
+        chosen += 1
+    edge = np.empty(count, np.int32)
+    size = 0
+    for v in range(count):
+        if out[v]:
+            edge[size] = v
+            size += 1
+    in_template = how > 0.82
+    patience = 20 * count
+    while chosen < want and patience > 0:
+        patience -= 1
+        u = edge[random_below(generator, size)]
+        f = random_below(generator, 6)
+        if in_template:
+            cell = tables.around[pose[u] // 24, f]
+            v = holder[cell] if cell >= 0 else -1
+        else:
+            v = tables.neighbour[u, f]
+        if v >= 0 and not out[v]:
+            out[v] = True
+            edge[size] = v
+            size += 1
+            chosen += 1
+    return chosen
+
+
+@njit(cache=True)
+def propose(
+    tables: Tables,
+    pose: NDArray[np.int32],
+    empty_face: float,
+    threshold: float,
+    tries: int,
+    least: int,
+    most: int,
+    width: int,
+    noise: float,
+    joint_share: float,
+    generator: NDArray[np.uint64],
+    out: NDArray[np.int32],
+) -> tuple[int, float, int]:
+    """Look for other poses whose energy is at most `threshold`.
+
+    Parameters
+    ----------
+    pose : (n,) int32 array
+        Full set of poses to start from.
+    empty_face : float
+        Weighted energy of one boundary face of an empty template cell.
+    threshold : float
+    tries : int
+        Most removals tried.
+    least, most : int
+        Number of voxels taken out at a time.
+    width, noise, joint_share
+        Of the beam, see :func:`fabfold.tree.grow.fill_beam`.
+    generator : (1,) uint64 array
+    out : (n,) int32 array
+        Filled with the new poses.
+
+    Returns
+    -------
+    used : int
+        Removals tried; 0 is never returned.
+    energy : float
+        Of `out`; infinite when nothing was found.
+    found : int
+        Rigid clusters of `out`.
+    """
+    count = len(pose)
+    label = np.empty(count, np.int32)
+    clusters(tables, pose, label)
+    holder = np.full(len(tables.cells), -1, np.int32)
+    for v in range(count):
+        holder[pose[v] // 24] = v
+    gone = np.empty(count, np.bool_)
+    results = np.empty((width, count), np.int32)
+    start = np.empty(count, np.int32)
+    for attempt in range(tries):
+        chosen = ruin(tables, pose, label, holder, least, most, generator, gone)
+        if chosen >= count:
+            gone[random_below(generator, count)] = False
+            chosen -= 1
+        todo = np.empty(chosen, np.int32)
+        k = 0
+        for v in range(count):
+            start[v] = pose[v]
+            if gone[v]:
+                start[v] = -1
+                todo[k] = v
+                k += 1
+        rows, _ = fill_beam(
+            tables, start, todo, width, noise, joint_share, generator, results
+        )
+        best = np.inf
+        best_row = -1
+        best_found = 0
+        for r in range(rows):
+            same = True
+            for v in range(count):
+                if results[r, v] != pose[v]:
+                    same = False
+                    break
+            if same:
+                continue
+            energy, found = energy_of(tables, results[r], empty_face)
+            if energy <= threshold and energy < best and connected(tables, results[r]):
+                best = energy
+                best_row = r
+                best_found = found
+        if best_row >= 0:
+            out[:] = results[best_row]
+            return attempt + 1, best, best_found
+    return tries, np.inf, 0
