@@ -1,0 +1,188 @@
+"""From a closed mesh to subvoxels: an exact column scan, and box counts of the result.
+
+The scan is watertight by construction. A mesh row (one y, one x after another) is cut out of every
+triangle by its directed edges, and an edge's crossing is computed from its two corners in the order
+of their indices, so that both triangles beside it get the same floating-point number. The signed
+intervals of a closed mesh therefore cancel exactly, whatever the rounding, and no column leaks.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["box_counts", "occupancy", "summed_volume"]
+
+
+@njit(cache=True)
+def _winding_steps(vertices, faces, nx, ny, nz):  # type: ignore[no-untyped-def]
+    """Change of the winding number at each subvoxel centre on the way up in z, int16."""
+    steps = np.zeros((nx, ny, nz), dtype=np.int16)
+    for f in range(faces.shape[0]):
+        y_low = math.inf
+        y_high = -math.inf
+        for corner in range(3):
+            y = vertices[faces[f, corner], 1]
+            y_low = min(y_low, y)
+            y_high = max(y_high, y)
+        first = max(0, math.ceil(y_low - 0.5))
+        last = min(ny - 1, math.floor(y_high - 0.5))
+        for iy in range(first, last + 1):
+            py = iy + 0.5
+            x_up = z_up = x_down = z_down = 0.0
+            crossings = 0
+            for corner in range(3):
+                u = faces[f, corner]
+                v = faces[f, (corner + 1) % 3]
+                below_u = vertices[u, 1] <= py
+                below_v = vertices[v, 1] <= py
+                if below_u == below_v:
+                    continue
+                low = min(u, v)
+                high = max(u, v)
+                share = (py - vertices[low, 1]) / (vertices[high, 1] - vertices[low, 1])
+                x = vertices[low, 0] + share * (vertices[high, 0] - vertices[low, 0])
+                z = vertices[low, 2] + share * (vertices[high, 2] - vertices[low, 2])
+                crossings += 1
+                if below_u:
+                    x_up = x
+                    z_up = z
+                else:
+                    x_down = x
+                    z_down = z
+            if crossings != 2 or x_up == x_down:
+                continue
+            # The rising edge is on the right of a triangle that faces up: the top of the solid.
+            if x_up > x_down:
+                step = -1
+                x_low, x_high, z_left, z_right = x_down, x_up, z_down, z_up
+            else:
+                step = 1
+                x_low, x_high, z_left, z_right = x_up, x_down, z_up, z_down
+            ix = max(0, math.ceil(x_low - 0.5))
+            while ix < nx and ix + 0.5 < x_high:
+                share = (ix + 0.5 - x_low) / (x_high - x_low)
+                height = z_left + share * (z_right - z_left)
+                k = max(0, math.ceil(height - 0.5))
+                if k < nz:
+                    steps[ix, iy, k] += step
+                ix += 1
+    return steps
+
+
+@njit(cache=True)
+def _occupied(steps):  # type: ignore[no-untyped-def]
+    nx, ny, nz = steps.shape
+    result = np.zeros((nx, ny, nz), dtype=np.bool_)
+    for i in range(nx):
+        for j in range(ny):
+            winding = 0
+            for k in range(nz):
+                winding += steps[i, j, k]
+                result[i, j, k] = winding > 0
+    return result
+
+
+@njit(cache=True)
+def _summed(steps):  # type: ignore[no-untyped-def]
+    nx, ny, nz = steps.shape
+    table = np.zeros((nx + 1, ny + 1, nz + 1), dtype=np.int32)
+    for i in range(nx):
+        for j in range(ny):
+            winding = 0
+            column = 0
+            for k in range(nz):
+                winding += steps[i, j, k]
+                if winding > 0:
+                    column += 1
+                table[i + 1, j + 1, k + 1] = (
+                    column + table[i, j + 1, k + 1] + table[i + 1, j, k + 1] - table[i, j, k + 1]
+                )
+    return table
+
+
+@njit(cache=True)
+def _box_counts(table, xs, ys, zs):  # type: ignore[no-untyped-def]
+    counts = np.zeros((len(xs) - 1, len(ys) - 1, len(zs) - 1), dtype=np.int32)
+    nx, ny, nz = table.shape[0] - 1, table.shape[1] - 1, table.shape[2] - 1
+    for i in range(len(xs) - 1):
+        x0 = min(max(xs[i], 0), nx)
+        x1 = min(max(xs[i + 1], 0), nx)
+        for j in range(len(ys) - 1):
+            y0 = min(max(ys[j], 0), ny)
+            y1 = min(max(ys[j + 1], 0), ny)
+            for k in range(len(zs) - 1):
+                z0 = min(max(zs[k], 0), nz)
+                z1 = min(max(zs[k + 1], 0), nz)
+                counts[i, j, k] = (
+                    table[x1, y1, z1]
+                    - table[x0, y1, z1]
+                    - table[x1, y0, z1]
+                    - table[x1, y1, z0]
+                    + table[x0, y0, z1]
+                    + table[x0, y1, z0]
+                    + table[x1, y0, z0]
+                    - table[x0, y0, z0]
+                )
+    return counts
+
+
+def occupancy(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], shape: tuple[int, int, int]
+) -> NDArray[np.bool_]:
+    """Which subvoxels have their centre inside a closed mesh.
+
+    Inside is where the winding number is positive, so overlapping shells count as material.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+        In subvoxel units: subvoxel ``(i, j, k)`` is the unit cube with its centre at
+        ``(i, j, k) + 0.5``.
+    faces : (f, 3) int32 array
+        A closed mesh, counter-clockwise seen from outside.
+    shape : three int
+        Subvoxels along x, y and z. Material below z = 0 or outside in x and y is not lost to the
+        winding number, it is only not recorded.
+
+    Returns
+    -------
+    bool array of `shape`
+    """
+    return np.asarray(_occupied(_winding_steps(vertices, faces, *shape)))
+
+
+def summed_volume(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], shape: tuple[int, int, int]
+) -> NDArray[np.int32]:
+    """Summed volume table of :func:`occupancy`.
+
+    Returns
+    -------
+    int32 array, one longer than `shape` on each axis
+        Entry ``(i, j, k)`` counts the occupied subvoxels with all three indices below it.
+    """
+    return np.asarray(_summed(_winding_steps(vertices, faces, *shape)))
+
+
+def box_counts(
+    table: NDArray[np.int32],
+    planes: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
+) -> NDArray[np.int32]:
+    """Occupied subvoxels in each box between neighbouring planes.
+
+    Parameters
+    ----------
+    table : int32 array
+        From :func:`summed_volume`.
+    planes : three int64 arrays
+        Ascending plane positions in subvoxels; those outside the table see no material.
+
+    Returns
+    -------
+    (len(x) - 1, len(y) - 1, len(z) - 1) int32 array
+    """
+    return np.asarray(_box_counts(table, *planes))

@@ -1,0 +1,90 @@
+"""Voxels on disk: one npz file, the same bytes for the same voxels."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from fabfold.errors import KitError
+from fabfold.files import write_bytes
+from fabfold.voxels.model import SUBDIVISION, Voxels
+
+__all__ = ["load_voxels", "save_voxels"]
+
+_FORMAT = "fabfold-voxels 1"
+
+
+def save_voxels(path: Path, voxels: Voxels) -> None:
+    """Write voxels to `path` in one step.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.npz``; the file is an ordinary compressed npz with fixed time stamps.
+    voxels : Voxels
+    """
+    names = sorted(voxels.energy)
+    arrays = {
+        "format": np.array(_FORMAT),
+        "cells": voxels.cells,
+        "subvoxels": np.packbits(voxels.subvoxels),
+        "fill": voxels.fill,
+        "vertices": voxels.vertices,
+        "faces": voxels.faces,
+        "rotation": voxels.rotation,
+        "origin": voxels.origin,
+        "pitch": np.array(voxels.pitch),
+        "offsets_x": voxels.plane_offsets[0],
+        "offsets_y": voxels.plane_offsets[1],
+        "offsets_z": voxels.plane_offsets[2],
+        "lost_volume": np.array(voxels.lost_volume),
+        "energy_names": np.array(names, dtype=np.str_),
+        "energy_values": np.array([voxels.energy[name] for name in names], dtype=np.float64),
+    }
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in arrays.items():
+            member = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+            member.compress_type = zipfile.ZIP_DEFLATED
+            content = io.BytesIO()
+            np.lib.format.write_array(content, np.asarray(array, order="C"), allow_pickle=False)
+            archive.writestr(member, content.getvalue())
+    write_bytes(Path(path), buffer.getvalue())
+
+
+def load_voxels(path: Path) -> Voxels:
+    """Read voxels that :func:`save_voxels` wrote.
+
+    Raises
+    ------
+    KitError
+        If the file is missing, damaged, or something else.
+    """
+    try:
+        with np.load(Path(path), allow_pickle=False) as data:
+            if str(data["format"]) != _FORMAT:
+                raise KitError(f"{path}: not a {_FORMAT} file; make the voxels again")
+            cells = data["cells"].astype(np.int32)
+            size = len(cells) * SUBDIVISION**3
+            subvoxels = np.unpackbits(data["subvoxels"], count=size).astype(bool)
+            names = [str(name) for name in data["energy_names"]]
+            return Voxels(
+                cells=cells,
+                subvoxels=subvoxels.reshape(len(cells), SUBDIVISION, SUBDIVISION, SUBDIVISION),
+                fill=data["fill"],
+                vertices=data["vertices"],
+                faces=data["faces"],
+                rotation=data["rotation"],
+                origin=data["origin"],
+                pitch=float(data["pitch"]),
+                plane_offsets=(data["offsets_x"], data["offsets_y"], data["offsets_z"]),
+                lost_volume=float(data["lost_volume"]),
+                energy=dict(zip(names, data["energy_values"].tolist(), strict=True)),
+            )
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise KitError(
+            f"{path}: cannot be read as voxels ({error}); delete it and make the voxels again"
+        ) from error
