@@ -377,11 +377,14 @@ def test_report_json_and_page(tmp_path):
         _Check("bodies", 4, 4, "", True, ""),
         _Check("wall <thin>", float("nan"), 0.8, "mm", False, "use a larger voxel"),
     ]
-    path = tmp_path / "report.json"
     write_report(
-        path, checks, {"model": "row", "hinges": len(ROW)}, title="Row", pictures=[("A", b"png")]
+        tmp_path,
+        checks,
+        {"model": "row", "hinges": len(ROW)},
+        title="Row",
+        pictures=[("A", b"png")],
     )
-    data = json.loads(path.read_text(encoding="utf-8"))
+    data = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert (data["format"], data["version"], data["verdict"]) == ("fabfold-report", 1, "failed")
     assert [c["verdict"] for c in data["checks"]] == ["ok", "ok", "failed"]
     assert data["checks"][0] == {

@@ -95,19 +95,19 @@ def report_data(checks: Sequence[CheckResult], summary: Mapping[str, Any]) -> di
 
 
 def write_report(
-    path: Path,
+    folder: Path,
     checks: Sequence[CheckResult],
     summary: Mapping[str, Any],
     *,
     title: str = "kit",
     pictures: Sequence[tuple[str, bytes]] = (),
 ) -> None:
-    """Write ``report.json`` at `path` and a page to read beside it, ending in ``.html``.
+    """Write ``report.json`` and ``report.html``, a page to read.
 
     Parameters
     ----------
-    path : Path
-        Ends in ``.json``.
+    folder : Path
+        The kit folder.
     checks : sequence of CheckResult
     summary : mapping
         See :func:`report_data`.
@@ -117,8 +117,8 @@ def write_report(
         Shown on the page, inside the file.
     """
     data = report_data(checks, summary)
-    write_json(path, data)
-    write_text(path.with_suffix(".html"), report_page(data, title=title, pictures=pictures))
+    write_json(folder / "report.json", data)
+    write_text(folder / "report.html", report_page(data, title=title, pictures=pictures))
 
 
 _STYLE = """
