@@ -1,0 +1,168 @@
+"""Cutting the warped model into the cells of each body.
+
+All of joinery works in a frame of its own: millimetres, axes and origin of the lattice of shape A,
+so that the lattice point ``p`` lies at ``voxel_mm * p``. The origin of the kit is added at the end.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.errors import GeometryError
+from fabfold.voxels.model import Voxels
+
+if TYPE_CHECKING:
+    import manifold3d
+
+__all__ = ["as_manifold", "eroded_cells", "model_manifold", "occupancy"]
+
+#: Shift of the scan lines in `occupancy`, as a share of the pitch: rays that run through the
+#: vertices and edges of axis-aligned boxes would meet degenerate hits.
+_SCAN_SHIFT = (0.0131, 0.0173)
+
+
+def as_manifold(
+    vertices: NDArray[np.float64], faces: NDArray[np.generic], what: str
+) -> manifold3d.Manifold:
+    """Exact-boolean solid of a closed mesh.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+    faces : (f, 3) integer array
+    what : str
+        Name of the mesh for the error message.
+
+    Raises
+    ------
+    GeometryError
+        If the mesh is not a closed two-manifold.
+    """
+    import manifold3d
+
+    solid = manifold3d.Manifold(
+        manifold3d.Mesh64(
+            np.ascontiguousarray(vertices, dtype=np.float64),
+            np.ascontiguousarray(faces, dtype=np.uint64),
+        )
+    )
+    if solid.status() != manifold3d.Error.NoError or solid.is_empty():
+        raise GeometryError(
+            f"{what}: not a closed two-manifold mesh (manifold3d says {solid.status().name}); "
+            "repair the mesh and run again"
+        )
+    return solid
+
+
+def model_manifold(voxels: Voxels, voxel_mm: float) -> manifold3d.Manifold:
+    """The warped model in mm, lattice origin at zero."""
+    return as_manifold(voxels.vertices * voxel_mm, voxels.faces, "warped model")
+
+
+def eroded_cells(cells: NDArray[np.int32], voxel_mm: float, inset_mm: float) -> manifold3d.Manifold:
+    """Cells of a body less everything within `inset_mm` of a cell that is not its own.
+
+    Distance is measured by the largest coordinate difference, so the result is the union of boxes:
+    one for each cell, each pair that shares a face, each square of four and each cube of eight,
+    every one inset on all sides. Where cells meet, these boxes overlap and no gap is left.
+
+    Parameters
+    ----------
+    cells : (m, 3) int32 array
+        The body's cells in lattice units.
+    voxel_mm : float
+        Side of a cell.
+    inset_mm : float
+        Half the gap between bodies.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In mm.
+    """
+    import manifold3d
+
+    own = {tuple(cell) for cell in cells.tolist()}
+    boxes = []
+    for extent in itertools.product((1, 2), repeat=3):
+        offsets = list(itertools.product(*(range(e) for e in extent)))
+        for cell in sorted(own):
+            if not all(tuple(np.add(cell, o)) in own for o in offsets):
+                continue
+            # A larger block that holds this one makes it superfluous.
+            if _inside_larger(cell, extent, own):
+                continue
+            size = np.array(extent) * voxel_mm - 2 * inset_mm
+            corner = (np.array(cell) - 0.5) * voxel_mm + inset_mm
+            boxes.append(manifold3d.Manifold.cube(tuple(size)).translate(tuple(corner)))
+    return manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add)
+
+
+def _inside_larger(
+    cell: tuple[int, ...], extent: tuple[int, ...], own: set[tuple[int, ...]]
+) -> bool:
+    """Whether growing the block along one of its thin axes stays within the body's cells."""
+    for axis in range(3):
+        if extent[axis] == 2:
+            continue
+        slab = itertools.product(*(range(e) for e in extent))
+        layer = [tuple(np.add(cell, o)) for o in slab]
+        for step in (-1, 1):
+            shift = np.eye(3, dtype=int)[axis] * step
+            if all(tuple(np.add(c, shift).tolist()) in own for c in layer):
+                return True
+    return False
+
+
+def occupancy(
+    solid: manifold3d.Manifold,
+    corner: NDArray[np.float64],
+    pitch: float,
+    shape: tuple[int, int, int],
+) -> NDArray[np.bool_]:
+    """Which points of a regular grid lie inside a solid.
+
+    One ray a column is cast along z and its hits are paired up, which is exact but for the tiny
+    shift of the columns.
+
+    Parameters
+    ----------
+    solid : manifold3d.Manifold
+    corner : (3,) float64 array
+        First grid point in mm.
+    pitch : float
+        Grid spacing in mm.
+    shape : tuple of int
+        Number of grid points along x, y and z.
+
+    Returns
+    -------
+    bool array of the given shape
+    """
+    grid = np.zeros(shape, dtype=bool)
+    if solid.is_empty():
+        return grid
+    low_x, low_y, low_z, high_x, high_y, high_z = solid.bounding_box()
+    heights = corner[2] + pitch * np.arange(shape[2])
+    start, stop = low_z - pitch, high_z + pitch
+    for i in range(shape[0]):
+        x = corner[0] + pitch * (i + _SCAN_SHIFT[0])
+        if not low_x <= x <= high_x:
+            continue
+        for j in range(shape[1]):
+            y = corner[1] + pitch * (j + _SCAN_SHIFT[1])
+            if not low_y <= y <= high_y:
+                continue
+            hits = solid.ray_cast((x, y, start), (x, y, stop))
+            if not hits:
+                continue
+            # Depth of nesting below each height: down-facing hits open, up-facing hits close.
+            z = np.array([hit.position[2] for hit in hits])
+            step = np.array([1 if hit.normal[2] < 0 else -1 for hit in hits])
+            depth = np.concatenate([[0], np.cumsum(step)])
+            grid[i, j] = depth[np.searchsorted(z, heights)] > 0
+    return grid

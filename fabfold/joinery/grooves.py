@@ -1,0 +1,296 @@
+"""Grooves: room for hinge barrels wherever they pass on the folding path.
+
+A barrel stands out of its two bodies by its radius, around a lattice edge. The path was planned
+for cubes, which know nothing of barrels, so every other body loses what comes closer to a barrel
+than the clearance, in shape A, in shape B and in all states between.
+
+Seen from a body, a barrel either rests or turns about the axis of the hinge that is moving. The
+turn is cut into steps, and each step is covered by the convex hull of the barrel at its two ends.
+The hull of two placements misses at most the sagitta of the arc, by which the barrel is thickened,
+so the groove contains the true swept region and exceeds it by hundredths of a millimetre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.fold.model import Motion
+from fabfold.lattice import rotation_about
+from fabfold.tree.model import FoldTree
+
+if TYPE_CHECKING:
+    import manifold3d
+
+__all__ = ["Passage", "descendants", "groove_tools", "passages"]
+
+#: How far the hull of two placements may fall short of the arc between them, in mm.
+SAGITTA_MM = 0.02
+_MAX_STEP_DEG = 6.0
+_SIDES = 32
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Passage:
+    """One way in which a barrel comes past a body, in the body's own frame (its place in A).
+
+    Attributes
+    ----------
+    body : int
+        The body that it passes.
+    hinge : int
+        The hinge whose barrel it is (the first found, if several go the same way).
+    start : (2, 3) float64 array
+        Ends of the lattice edge that carries the barrel, lattice units.
+    point, direction : (3,) float64 arrays
+        Axis of the turn, lattice units; unused if `angle_deg` is 0.
+    angle_deg : float
+        Signed right-handed turn; 0 for a barrel that rests.
+    """
+
+    body: int
+    hinge: int
+    start: Floats
+    point: Floats
+    direction: Floats
+    angle_deg: float
+
+    def placements(self, angles_deg: Floats) -> Floats:
+        """Ends of the barrel's edge at some angles of the turn, shape (a, 2, 3)."""
+        return np.array(
+            [
+                self.start
+                @ (turn := rotation_about(self.point, self.direction, float(a)))[:3, :3].T
+                + turn[:3, 3]
+                for a in angles_deg
+            ]
+        )
+
+
+def descendants(tree: FoldTree) -> NDArray[np.bool_]:
+    """Which bodies each hinge carries, shape (hinges, bodies)."""
+    moves = np.zeros((len(tree.hinges), len(tree.bodies)), dtype=bool)
+    for index in range(len(tree.hinges) - 1, -1, -1):
+        child = tree.hinges[index].child
+        moves[index, child] = True
+        for later in range(index + 1, len(tree.hinges)):
+            if tree.hinges[later].parent == child:
+                moves[index] |= moves[later]
+    return moves
+
+
+def passages(tree: FoldTree, motion: Motion, barrels: NDArray[np.bool_]) -> list[Passage]:
+    """Every distinct way in which a barrel comes past a body that it does not belong to.
+
+    Parameters
+    ----------
+    tree : FoldTree
+    motion : Motion
+        One hinge a move, linear between keyframes.
+    barrels : (h,) bool array
+        Hinges that have a barrel.
+
+    Returns
+    -------
+    list of Passage
+        In a fixed order.
+    """
+    carried = descendants(tree)
+    ends = np.array(
+        [
+            [np.array(h.point) + s * 0.5 * np.array(h.direction, dtype=float) for s in (-1, 1)]
+            for h in tree.hinges
+        ]
+    ).reshape(-1, 2, 3)
+    found: dict[tuple[object, ...], Passage] = {}
+
+    def keep(passage: Passage) -> None:
+        key = _key(passage)
+        if key not in found:
+            found[key] = passage
+
+    zero = np.zeros(3)
+    for h, hinge in enumerate(tree.hinges):
+        if not barrels[h]:
+            continue
+        for b in range(len(tree.bodies)):
+            if b not in (hinge.parent, hinge.child):
+                keep(Passage(b, h, ends[h], zero, zero, 0.0))
+    for k in range(1, len(motion.angles_deg)):
+        poses = tree.body_poses(motion.angles_deg[k - 1])
+        inverses = np.array([_inverse(pose) for pose in poses])
+        for m in motion.moves[k]:
+            turn = float(motion.angles_deg[k, m] - motion.angles_deg[k - 1, m])
+            world = poses[tree.hinges[m].parent]
+            axis_point = world[:3, :3] @ np.array(tree.hinges[m].point) + world[:3, 3]
+            axis = world[:3, :3] @ np.array(tree.hinges[m].direction, dtype=float)
+            for h, hinge in enumerate(tree.hinges):
+                if h == m or not barrels[h]:
+                    continue
+                pose = poses[hinge.parent]
+                placed = ends[h] @ pose[:3, :3].T + pose[:3, 3]
+                moving = carried[m, hinge.parent]
+                for b in range(len(tree.bodies)):
+                    if carried[m, b] == moving:
+                        continue
+                    back = inverses[b]
+                    keep(
+                        Passage(
+                            b,
+                            h,
+                            placed @ back[:3, :3].T + back[:3, 3],
+                            back[:3, :3] @ axis_point + back[:3, 3],
+                            back[:3, :3] @ axis,
+                            turn if moving else -turn,
+                        )
+                    )
+    return _without_covered_rests(list(found.values()))
+
+
+def _inverse(pose: Floats) -> Floats:
+    inverse = np.eye(4)
+    inverse[:3, :3] = pose[:3, :3].T
+    inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
+    return inverse
+
+
+def _segment_key(ends: Floats) -> tuple[tuple[float, ...], ...]:
+    first, second = (tuple((np.round(end, 5) + 0.0).tolist()) for end in ends)
+    return (first, second) if first <= second else (second, first)
+
+
+def _key(passage: Passage) -> tuple[object, ...]:
+    """Equal for passages that sweep the same region, in whichever direction."""
+    if passage.angle_deg == 0.0:
+        return (passage.body, 0.0, _segment_key(passage.start))
+    unit, angle = passage.direction, passage.angle_deg
+    last = passage.placements(np.array([angle]))[0]
+    start, end = _segment_key(passage.start), _segment_key(last)
+    if end < start:
+        start, end, angle = end, start, -angle
+    if tuple(np.round(unit, 5)) < tuple(np.round(-unit, 5)):
+        unit, angle = -unit, -angle
+    foot = passage.point - (passage.point @ unit) * unit
+    return (
+        passage.body,
+        round(angle, 4),
+        start,
+        end,
+        tuple((np.round(foot, 5) + 0.0).tolist()),
+        tuple((np.round(unit, 5) + 0.0).tolist()),
+    )
+
+
+def _without_covered_rests(found: list[Passage]) -> list[Passage]:
+    """Leave out resting barrels that are the start or the end of a turn."""
+    covered = set()
+    for passage in found:
+        if passage.angle_deg != 0.0:
+            for ends in passage.placements(np.array([0.0, passage.angle_deg])):
+                covered.add((passage.body, _segment_key(ends)))
+    return [
+        passage
+        for passage in found
+        if passage.angle_deg != 0.0 or (passage.body, _segment_key(passage.start)) not in covered
+    ]
+
+
+def _segment_distance(placements: Floats, low: Floats, high: Floats) -> Floats:
+    """Lower bound of the distance from barrels' edges to a set of boxes, shape (a,)."""
+    samples = np.linspace(0.0, 1.0, 9)
+    points = placements[:, :1] + samples[:, None] * (placements[:, 1:] - placements[:, :1])
+    flat = points.reshape(-1, 1, 3)
+    outside = np.maximum(np.maximum(low - flat, flat - high), 0.0)
+    nearest = np.linalg.norm(outside, axis=2).min(axis=1).reshape(len(placements), -1).min(axis=1)
+    return np.asarray(nearest - 0.5 / (len(samples) - 1), dtype=float)
+
+
+def _rod(ends: Floats, radius: float, trim: float) -> Floats:
+    """Points whose hull is a rod about the segment `ends` (mm), shortened by `trim` at each end.
+
+    The polygon is drawn about the circle, so the rod contains the round one.
+    """
+    axis = ends[1] - ends[0]
+    axis = axis / np.linalg.norm(axis)
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    across = np.cross(axis, helper)
+    across /= np.linalg.norm(across)
+    upright = np.cross(axis, across)
+    angles = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    ring = (
+        radius
+        / np.cos(np.pi / _SIDES)
+        * (np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * upright)
+    )
+    return np.concatenate([ends[0] + trim * axis + ring, ends[1] - trim * axis + ring])
+
+
+def groove_tools(
+    found: list[Passage],
+    low: Floats,
+    high: Floats,
+    *,
+    voxel_mm: float,
+    radius_mm: float,
+    trim_mm: float,
+) -> list[manifold3d.Manifold]:
+    """Cutting solids for one body.
+
+    Parameters
+    ----------
+    found : list of Passage
+        The passages of this body.
+    low, high : (m, 3) float64 arrays
+        Boxes that hold the body's material, lattice units.
+    voxel_mm : float
+    radius_mm : float
+        Barrel radius and clearance.
+    trim_mm : float
+        How much shorter than the lattice edge the groove is at each end.
+
+    Returns
+    -------
+    list of manifold3d.Manifold
+        Convex solids in mm that may overlap each other.
+    """
+    import manifold3d
+
+    tools = []
+    reach = (radius_mm + SAGITTA_MM) / voxel_mm / np.cos(np.pi / _SIDES)
+    for passage in found:
+        if passage.angle_deg == 0.0:
+            if _segment_distance(passage.start[None], low, high)[0] < reach:
+                rod = _rod(passage.start * voxel_mm, radius_mm, trim_mm)
+                tools.append(manifold3d.Manifold.hull_points(rod))
+            continue
+        arm = _arm(passage)
+        step = min(
+            _MAX_STEP_DEG,
+            2 * np.degrees(np.arccos(max(0.0, 1 - SAGITTA_MM / max(arm * voxel_mm, 1e-9)))),
+        )
+        count = max(1, int(np.ceil(abs(passage.angle_deg) / step)))
+        angles = np.linspace(0.0, passage.angle_deg, count + 1)
+        # A bound at every step end, widened by the way a point makes in half a step.
+        placements = passage.placements(angles)
+        slack = arm * np.radians(abs(passage.angle_deg) / count) / 2
+        near = _segment_distance(placements, low, high) < reach + slack
+        wanted = near[:-1] | near[1:]
+        for index in np.flatnonzero(wanted):
+            rods = [
+                _rod(ends * voxel_mm, radius_mm + SAGITTA_MM, trim_mm - SAGITTA_MM)
+                for ends in placements[index : index + 2]
+            ]
+            tools.append(manifold3d.Manifold.hull_points(np.concatenate(rods)))
+    return tools
+
+
+def _arm(passage: Passage) -> float:
+    """Largest distance of the barrel's edge from the axis of the turn, lattice units."""
+    away = passage.start - passage.point
+    across = away - (away @ passage.direction)[:, None] * passage.direction
+    return float(np.linalg.norm(across, axis=1).max())

@@ -1,0 +1,329 @@
+"""Struts: bars that make one printable piece out of what the cut left of a body.
+
+A cell may hold several pieces of material (two legs), the material of two rigidly joined cells may
+meet in a neck too thin to hold, and a hinge's bracket may stand where its cell has no material. The
+paper put struts in by hand; here a bar is laid along the shortest way through the body's own cells
+that prefers existing material.
+
+The way is found on the grid of subvoxels. A grid point is *free* if it lies in the body's eroded
+cells outside every groove and hinge carve, *solid* if material is there, and *core* if a cube of
+two points lies in the material: two parts that hang together through core points are joined by a
+neck of a tenth of a voxel or more.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.joinery.cells import occupancy
+
+if TYPE_CHECKING:
+    import manifold3d
+
+__all__ = ["Bar", "Grid", "bar_solid", "grid_of", "plan_struts"]
+
+#: Grid points along the side of a voxel.
+RESOLUTION = 20
+#: Cost of a step through air; a step through material costs 1.
+_AIR = 6.0
+#: Cost of a step beside the wall of the free space, where a bar would be trimmed.
+_TIGHT = 15.0
+#: Core parts smaller than this many points are no terminals (a 64th of a cell).
+_LEAST_CORE = RESOLUTION**3 // 64
+
+Bools = NDArray[np.bool_]
+Bar = NDArray[np.float64]
+"""Corners of a bar's middle line in mm, shape (k, 3)."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Where the grid points of one body are.
+
+    Attributes
+    ----------
+    corner : (3,) float64 array
+        First grid point in mm.
+    pitch : float
+        Spacing in mm.
+    cell : (x, y, z) int array
+        Index into the body's cells of each point, -1 outside.
+    """
+
+    corner: NDArray[np.float64]
+    pitch: float
+    cell: NDArray[np.int32]
+
+    def sample(self, solid: manifold3d.Manifold) -> Bools:
+        """Which grid points lie in a solid."""
+        x, y, z = self.cell.shape
+        return occupancy(solid, self.corner, self.pitch, (x, y, z))
+
+    def points(self, nodes: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Coordinates in mm of grid points given by flat index."""
+        index = np.stack(np.unravel_index(nodes, self.cell.shape), axis=-1)
+        return np.asarray(self.corner + self.pitch * index, dtype=np.float64)
+
+
+def grid_of(cells: NDArray[np.int32], voxel_mm: float) -> Grid:
+    """Grid of subvoxel centres over the box of a body's cells.
+
+    Parameters
+    ----------
+    cells : (m, 3) int32 array
+    voxel_mm : float
+    """
+    low = cells.min(axis=0)
+    shape = (cells.max(axis=0) - low + 1) * RESOLUTION
+    owner = np.full(tuple(shape), -1, dtype=np.int32)
+    for index, cell in enumerate(cells - low):
+        x, y, z = cell * RESOLUTION
+        owner[x : x + RESOLUTION, y : y + RESOLUTION, z : z + RESOLUTION] = index
+    pitch = voxel_mm / RESOLUTION
+    return Grid((low - 0.5) * voxel_mm + pitch / 2, pitch, owner)
+
+
+def plan_struts(
+    grid: Grid, free: Bools, solid: Bools, pieces: list[Bools], brackets: list[Bools]
+) -> list[Bar] | None:
+    """Bars that tie all pieces, brackets and cells of a body together.
+
+    Parameters
+    ----------
+    grid : Grid
+    free : (x, y, z) bool array
+        Where a bar may run.
+    solid : (x, y, z) bool array
+        Material.
+    pieces : list of (x, y, z) bool arrays
+        The separate pieces of the material.
+    brackets : list of (x, y, z) bool arrays
+        The material of each hinge half inside the free space.
+
+    Returns
+    -------
+    list of (k, 3) float64 arrays, or None
+        The middle lines of the bars in mm; None if no way leads from one part to another.
+    """
+    from scipy import ndimage
+
+    core = _core(solid)
+    label, _ = ndimage.label(core)
+    terminals = _terminals(grid, label, pieces, brackets)
+    if len(terminals) < 2:
+        return []
+    # Terminals in the same core part hang together already.
+    groups = _merge_by_core(terminals, label)
+    if len(groups) < 2:
+        return []
+    way = _Ways(free, solid)
+    inner = ndimage.binary_erosion(solid, np.ones((3, 3, 3), dtype=bool)).reshape(-1)
+    bars: list[Bar] = []
+    while len(groups) > 1:
+        path = way.between(_deep(groups[0], inner), [_deep(g, inner) for g in groups[1:]])
+        if path is None:
+            return None
+        nodes, reached = path
+        bars.append(grid.points(way.straightened(nodes)))
+        joined = groups.pop(reached + 1)
+        groups[0] = np.unique(np.concatenate([groups[0], joined, nodes]))
+    return bars
+
+
+def _core(solid: Bools) -> Bools:
+    """Points that belong to a cube of two by two by two points in the material."""
+    from scipy import ndimage
+
+    cube = np.ones((2, 2, 2), dtype=bool)
+    return np.asarray(ndimage.binary_opening(solid, cube), dtype=bool)
+
+
+def _terminals(
+    grid: Grid, label: NDArray[np.int32], pieces: list[Bools], brackets: list[Bools]
+) -> list[NDArray[np.int64]]:
+    """Flat point indices of every part that must hang together."""
+    found = []
+    for bracket in brackets:
+        nodes = np.flatnonzero(bracket)
+        if len(nodes):
+            found.append(nodes)
+    for piece in pieces:
+        nodes = np.flatnonzero(piece)
+        if len(nodes):
+            found.append(nodes)
+    flat_label, flat_cell = label.reshape(-1), grid.cell.reshape(-1)
+    for cell in range(int(grid.cell.max()) + 1):
+        inside = np.flatnonzero((flat_cell == cell) & (flat_label > 0))
+        if len(inside) == 0:
+            continue
+        sizes = np.bincount(flat_label[inside])
+        largest = int(sizes.argmax())
+        if sizes[largest] >= _LEAST_CORE:
+            found.append(inside[flat_label[inside] == largest])
+    return found
+
+
+def _merge_by_core(
+    terminals: list[NDArray[np.int64]], label: NDArray[np.int32]
+) -> list[NDArray[np.int64]]:
+    """Unite terminals that share points or reach into the same core part.
+
+    A piece without any core (a thin blade) hangs together with what it shares points with.
+    """
+    import networkx as nx
+
+    flat = label.reshape(-1)
+    graph = nx.Graph()
+    graph.add_nodes_from(range(len(terminals)))
+    owner: dict[tuple[str, int], int] = {}
+    for index, nodes in enumerate(terminals):
+        parts = flat[nodes]
+        labels = np.unique(parts[parts > 0]).tolist()
+        keys = [("core", int(part)) for part in labels]
+        if not keys:
+            keys = [("point", int(node)) for node in nodes]
+        for key in keys:
+            if key in owner:
+                graph.add_edge(owner[key], index)
+            else:
+                owner[key] = index
+    groups = []
+    for members in sorted((sorted(c) for c in nx.connected_components(graph)), key=lambda c: c[0]):
+        groups.append(np.unique(np.concatenate([terminals[i] for i in members])))
+    return sorted(groups, key=len, reverse=True)
+
+
+def _deep(nodes: NDArray[np.int64], inner: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """The points of a part that lie a grid step inside it; all of them for a thin part."""
+    chosen = nodes[inner[nodes]]
+    return chosen if len(chosen) else nodes
+
+
+class _Ways:
+    """Shortest ways on the grid, through material where possible."""
+
+    def __init__(self, free: Bools, solid: Bools) -> None:
+        from scipy import ndimage, sparse
+
+        self.shape = free.shape
+        passable = free | solid
+        roomy = ndimage.binary_erosion(passable, np.ones((3, 3, 3), dtype=bool))
+        cost = np.where(solid, 1.0, _AIR) + np.where(roomy, 0.0, _TIGHT)
+        self.passable, self.roomy = passable, roomy
+        number = np.full(self.shape, -1, dtype=np.int64)
+        self.nodes = np.flatnonzero(passable)
+        number.reshape(-1)[self.nodes] = np.arange(len(self.nodes))
+        self.number = number.reshape(-1)
+        rows, columns, weights = [], [], []
+        for offset in _HALF_NEIGHBOURS:
+            extent = list(zip(offset, self.shape, strict=True))
+            here = tuple(slice(max(0, -d), s - max(0, d)) for d, s in extent)
+            there = tuple(slice(max(0, d), s - max(0, -d)) for d, s in extent)
+            both = passable[here] & passable[there]
+            rows.append(number[here][both])
+            columns.append(number[there][both])
+            length = float(np.linalg.norm(offset))
+            weights.append(length * (cost[here][both] + cost[there][both]) / 2)
+        count = len(self.nodes)
+        self.graph = sparse.coo_matrix(
+            (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))),
+            shape=(count, count),
+        ).tocsr()
+
+    def between(
+        self, start: NDArray[np.int64], ends: list[NDArray[np.int64]]
+    ) -> tuple[NDArray[np.int64], int] | None:
+        """Cheapest way from one part to the nearest of several others.
+
+        Returns
+        -------
+        nodes : (k,) int64 array
+            Flat grid indices along the way.
+        reached : int
+            Which of `ends`.
+        """
+        from scipy.sparse.csgraph import dijkstra
+
+        sources = self.number[start]
+        distance, before, _ = dijkstra(
+            self.graph,
+            directed=False,
+            indices=sources[sources >= 0],
+            min_only=True,
+            return_predecessors=True,
+        )
+        best: tuple[float, int, int] | None = None
+        for index, end in enumerate(ends):
+            numbers = self.number[end]
+            numbers = numbers[numbers >= 0]
+            if len(numbers) == 0:
+                continue
+            nearest = int(numbers[np.argmin(distance[numbers])])
+            if np.isfinite(distance[nearest]) and (
+                best is None or distance[nearest] < best[0] - 1e-9
+            ):
+                best = (float(distance[nearest]), index, nearest)
+        if best is None:
+            return None
+        way = [best[2]]
+        while before[way[-1]] >= 0:
+            way.append(int(before[way[-1]]))
+        return self.nodes[np.array(way[::-1])], best[1]
+
+    def straightened(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Corner points of the way with as few corners as line of sight allows."""
+        index = np.stack(np.unravel_index(nodes, self.shape), axis=-1)
+        kept = [0]
+        while kept[-1] < len(nodes) - 1:
+            here = kept[-1]
+            step = next(
+                there
+                for there in range(len(nodes) - 1, here, -1)
+                if there == here + 1 or self._sees(index[here], index[there])
+            )
+            kept.append(step)
+        return nodes[kept]
+
+    def _sees(self, first: NDArray[np.int64], last: NDArray[np.int64]) -> bool:
+        count = 2 * int(np.abs(last - first).max()) + 1
+        line = np.rint(np.linspace(first, last, count)).astype(int)
+        inside = self.roomy[tuple(line.T)]
+        # The two ends may stand at a wall; the bar is trimmed there.
+        return bool(inside[2:-2].all()) and bool(self.passable[tuple(line.T)].all())
+
+
+_HALF_NEIGHBOURS = [
+    (dx, dy, dz)
+    for dx in (-1, 0, 1)
+    for dy in (-1, 0, 1)
+    for dz in (-1, 0, 1)
+    if (dx, dy, dz) > (0, 0, 0)
+]
+
+
+def bar_solid(bar: Bar, width_mm: float) -> manifold3d.Manifold:
+    """Solid of a strut: the hull of a cube at both ends of each stretch of its middle line.
+
+    Parameters
+    ----------
+    bar : (k, 3) float64 array
+        In mm.
+    width_mm : float
+        Side of the cube.
+    """
+    import manifold3d
+
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2.0
+    points = bar if len(bar) > 1 else np.repeat(bar, 2, axis=0)
+    stretches = [
+        manifold3d.Manifold.hull_points(
+            np.concatenate([a + width_mm * corners, b + width_mm * corners])
+        )
+        for a, b in itertools.pairwise(points)
+    ]
+    return manifold3d.Manifold.batch_boolean(stretches, manifold3d.OpType.Add)
