@@ -139,7 +139,7 @@ def _kit(source: str, output: Path | None, workers: int | None, quiet: bool, **o
 
     for name in ("rotation", "origin"):
         options[name] = _triple(options[name], f"--{name}")
-    if output is None and not Path(source).is_dir():
+    if output is None and not (Path(source).is_dir() or source.endswith(".toml")):
         output = Path(f"{Path(source.removeprefix('sample:')).stem}-kit")
     kit = open_kit(source, folder=output, workers=workers, **options)
     if not quiet:

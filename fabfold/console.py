@@ -32,35 +32,48 @@ _TITLES = {
 
 
 class ConsoleListener:
-    """Shows a bar a stage on a terminal, and a line a stage elsewhere."""
+    """Shows a bar a stage on a terminal, and a line a stage elsewhere; stages may be nested."""
 
     def __init__(self) -> None:
-        self.console = Console(stderr=True)
+        self._console = Console(stderr=True)
+        self._bars: RichProgress | None = None
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Progress]:
         """Show the progress of one stage while the context is open."""
-        title = _TITLES.get(name, name)
-        start = time.monotonic()
-        if self.console.is_terminal:
-            bar = RichProgress(
-                TextColumn("{task.fields[title]:24}"),
-                BarColumn(bar_width=24),
-                TimeElapsedColumn(),
-                TextColumn("{task.description}"),
-                console=self.console,
-            )
-            with bar:
-                live = _LiveBar(bar, title)
-                yield live
-                live.done()
-        else:
+        base, _, number = name.partition("-")
+        title = _TITLES.get(base, base) + (f", round {int(number) + 1}" if number else "")
+        if not self._console.is_terminal:
             plain = _LastMessage()
+            start = time.monotonic()
             yield plain
             seconds = time.monotonic() - start
-            self.console.print(
-                f"{title:24} {seconds:6.1f} s  {plain.message}", highlight=False, soft_wrap=True
+            self._console.print(
+                f"{title:32} {seconds:6.1f} s  {plain.message}", highlight=False, soft_wrap=True
             )
+        elif self._bars is not None:
+            with _bar(self._bars, title) as bar:
+                yield bar
+        else:
+            columns = (
+                TextColumn("{task.fields[title]:32}"),
+                BarColumn(bar_width=20),
+                TimeElapsedColumn(),
+                TextColumn("{task.description}", markup=False),
+            )
+            try:
+                with RichProgress(*columns, console=self._console) as self._bars:
+                    with _bar(self._bars, title) as bar:
+                        yield bar
+            finally:
+                self._bars = None
+
+
+@contextmanager
+def _bar(bars: RichProgress, title: str) -> Iterator[_LiveBar]:
+    bar = _LiveBar(bars, title)
+    yield bar
+    bar.done()
 
 
 class _LiveBar:
@@ -117,7 +130,8 @@ def _result_lines(kit: Kit, stage: str) -> list[str]:
         checks = kit.check()
         bad = [check for check in checks if not check.ok]
         lines += [
-            f"FAILED {check.name}: {check.figure:g} {check.unit}, limit {check.limit:g}: {check.note}"
+            f"FAILED {check.name}: {check.figure:g} {check.unit} "
+            f"(limit {check.limit:g}): {check.note}"
             for check in bad
         ]
         lines.append(f"{len(checks) - len(bad)} of {len(checks)} checks passed")

@@ -166,9 +166,8 @@ class Kit:
         NoTreeError, NoFoldError
             If no round of the recipe finds one.
         """
-        for _voxels, candidates in self._rounds():
-            return candidates
-        raise AssertionError("unreachable: rounds raise when they end")
+        _voxels, candidates = next(self._rounds())
+        return candidates
 
     def fold(self) -> Attempt:
         """Best tree with its folding path, certified for ideal cubes (paper section 5)."""
@@ -189,6 +188,7 @@ class Kit:
         from fabfold.stagefiles import load_made, save_made
 
         profile = self.profile()
+        self.fit()
 
         def make(progress: Progress) -> Made:
             refused: list[str] = []
@@ -432,7 +432,7 @@ def open_kit(
     ----------
     source : str
     folder : Path or None
-        Kit folder; for a kit folder as `source` the default is that folder.
+        Kit folder; for a kit folder or its ``kit.toml`` the default is that folder.
     workers : int or None
     **options
         Fields of the recipe; those that are None keep the recipe's or the default value.
@@ -449,9 +449,9 @@ def open_kit(
     if path.is_dir():
         if not (path / "kit.toml").is_file():
             raise KitError(f"{path}: a folder without kit.toml is no kit; give a model file")
-        folder = path if folder is None else folder
         path = path / "kit.toml"
     if path.suffix == ".toml":
+        folder = path.parent if folder is None else folder
         recipe = read_recipe(path)
         recipe = make_recipe(**{**recipe.model_dump(), **given})
         model = _find_model(recipe, path.parent)

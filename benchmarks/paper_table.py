@@ -1,0 +1,183 @@
+"""The paper's models and the samples, end to end: writes benchmarks/paper_table.md.
+
+    python benchmarks/paper_table.py [NAME ...] [--models DIR] [--kits DIR] [--verify verify_kit.py]
+
+Each model runs in a fresh process with an empty kit folder, on the command line's defaults. Seconds
+are wall-clock seconds of each stage; memory is the largest process (search workers included).
+Without names every model is run; with names only those rows are measured again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+SHARED = HERE.parents[1] / "shared"
+#: name: (source, template, joints of the paper, core-hours of the paper)
+MODELS: dict[str, tuple[str, str, int | None, int | None]] = {
+    "bunny": ("bunny.stl", "box-4x4x4", 29, 245),
+    "kitten": ("kitten.stl", "box-4x4x4", 34, 345),
+    "dragon": ("dragon.stl", "box-4x4x4", 32, 215),
+    "car": ("car.stl", "box-3x4x4", 22, 161),
+    "elephant": ("elephant.stl", "box-5x5x5", 62, 1005),
+}
+STAGES = ("solid", "voxelize", "fit", "join", "check", "export")
+
+
+class StageTimes:
+    """Listener that adds up the seconds of each stage, without those of stages inside it."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._inside = [0.0]
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Any]:
+        """Time one stage."""
+        from fabfold.progress import SilentProgress
+
+        self._inside.append(0.0)
+        start = time.perf_counter()
+        try:
+            yield SilentProgress()
+        finally:
+            whole = time.perf_counter() - start
+            key = name.partition("-")[0]
+            self.seconds[key] = self.seconds.get(key, 0.0) + whole - self._inside.pop()
+            self._inside[-1] += whole
+
+
+def run_one(source: str, template: str, kit_folder: Path) -> dict[str, Any]:
+    """Make one kit in this process and return its row."""
+    from fabfold.errors import FabfoldError
+    from fabfold.kit import Kit
+
+    times = StageTimes()
+    row: dict[str, Any] = {"template": template}
+    start = time.perf_counter()
+    try:
+        kit = Kit.from_model(source, template=template, folder=kit_folder)
+        kit.listener = times
+        kit.export()
+        row["checks_failed"] = [check.name for check in kit.check() if not check.ok]
+        row["exit"] = int(bool(row["checks_failed"]))
+        row["summary"] = json.loads((kit_folder / "report.json").read_text())["summary"]
+    except FabfoldError as error:
+        row["exit"], row["error"] = error.exit_code, str(error)
+    row["total"] = time.perf_counter() - start
+    row["seconds"] = times.seconds
+    usage = [
+        resource.getrusage(who).ru_maxrss
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    ]
+    row["peak_mib"] = max(usage) / 1024
+    return row
+
+
+def table(rows: dict[str, dict[str, Any]]) -> str:
+    """Markdown of all rows."""
+    lines = [
+        "# The paper's models and the samples, end to end",
+        "",
+        "Written by `python benchmarks/paper_table.py` on 2 cores, one run each with the defaults",
+        "of `fabfold export` (single hinges, seed 1). Joints in brackets are the paper's. *verify*",
+        "is an independent checker of the kit folder, where it is at hand.",
+        "",
+        "| model | template | voxels | joints (paper) | surface | count | total | moves |"
+        " carved cells | struts | gap mm | exit | verify |",
+        "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|",
+    ]
+    for name, row in rows.items():
+        paper = MODELS.get(name, ("", "", None, None))[2]
+        joints = f" ({paper})" if paper else ""
+        if "summary" not in row:
+            lines.append(
+                f"| {name} | {row['template']} | | {joints} | | | | | | | | {row['exit']} |"
+                f" {row['error']} |"
+            )
+            continue
+        s = row["summary"]
+        e = s["energy"]
+        lines.append(
+            f"| {name} | {row['template']} | {s['voxels']} | {s['joints']['S']}{joints} |"
+            f" {e['surface']:.2f} | {e['count']:.2f} | {e['total']:.2f} | {s['moves']} |"
+            f" {s['carved_cells']} | {s['struts']} | {row['gap']:.3f} | {row['exit']} |"
+            f" {row.get('verify', 'not run')} |"
+        )
+    lines += [
+        "",
+        "| model | " + " | ".join(f"{stage} s" for stage in STAGES) + " | all s | peak MiB |"
+        " paper core-h |",
+        "|---|" + "--:|" * (len(STAGES) + 3),
+    ]
+    for name, row in rows.items():
+        hours = MODELS.get(name, ("", "", None, None))[3]
+        cells = [f"{row['seconds'].get(stage, 0.0):.1f}" for stage in STAGES]
+        lines.append(
+            f"| {name} | " + " | ".join(cells) + f" | {row['total']:.1f} | {row['peak_mib']:.0f} |"
+            f" {hours or '–'} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--models", type=Path, default=SHARED / "models" / "paper")
+    parser.add_argument("--kits", type=Path, default=Path("paper-kits"))
+    parser.add_argument("--verify", type=Path, default=SHARED / "tools" / "verify_kit.py")
+    parser.add_argument("--one", nargs=3, metavar=("SOURCE", "TEMPLATE", "KIT"))
+    options = parser.parse_args()
+    if options.one:
+        source, template, kit = options.one
+        print(json.dumps(run_one(source, template, Path(kit))))
+        return
+
+    from fabfold.solid.samples import SAMPLES
+
+    jobs = {n: (str(options.models / m[0]), m[1]) for n, m in MODELS.items()}
+    jobs |= {f"sample:{n}": (f"sample:{n}", s.template) for n, s in SAMPLES.items()}
+    memory = HERE / "paper_table.json"
+    rows = json.loads(memory.read_text()) if memory.is_file() else {}
+    for name in options.names or jobs:
+        source, template = jobs[name]
+        kit = options.kits / name.replace(":", "-")
+        shutil.rmtree(kit, ignore_errors=True)
+        command = [sys.executable, __file__, "--one", source, template, str(kit)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            sys.exit(f"{name}: {done.stderr}")
+        row = json.loads(done.stdout.splitlines()[-1])
+        if "summary" in row:
+            motion = json.loads((kit / "motion.json").read_text())
+            row["gap"] = motion["certificate"]["min_gap_mm"]
+            if options.verify.is_file():
+                verdict = subprocess.run(
+                    [sys.executable, str(options.verify), str(kit), "--cad"],
+                    capture_output=True,
+                    text=True,
+                    check=False,
+                )
+                bad = [line for line in verdict.stdout.splitlines() if line.startswith("FAIL")]
+                row["verify"] = "passes" if verdict.returncode == 0 else "; ".join(bad) or "died"
+        rows[name] = row
+        print(
+            f"{name}: exit {row['exit']}, {row['total']:.1f} s", row.get("verify", ""), flush=True
+        )
+        ordered = {key: rows[key] for key in jobs if key in rows}
+        memory.write_text(json.dumps(ordered, indent=1) + "\n")
+        (HERE / "paper_table.md").write_text(table(ordered))
+
+
+if __name__ == "__main__":
+    main()
