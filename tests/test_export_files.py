@@ -45,7 +45,7 @@ def _mesh(solid: m3.Manifold) -> tuple[np.ndarray, np.ndarray]:
 def test_weld_joins_what_rounds_to_one_point():
     vertices, faces = _mesh(m3.Manifold.cube((1, 1, 1)))
     soup = vertices[faces].reshape(-1, 3) + np.linspace(0, 1e-5, 36)[:, None]
-    points, triangles = weld(soup, np.arange(36, dtype=np.int32).reshape(-1, 3))
+    points, triangles = weld(soup, np.arange(36, dtype=np.int32).reshape(-1, 3), 3)
     assert len(points) == 8
     assert len(triangles) == 12
     assert is_closed(triangles)
@@ -62,8 +62,8 @@ def test_is_closed_sees_a_hole_and_a_flipped_triangle():
 
 
 def test_printable_mesh_closes_a_sliver_that_rounding_pinches():
-    # Two blocks a hundred-thousandth apart but joined elsewhere: rounding closes the slit.
-    slit = m3.Manifold.cube((10, 10, 10)) - m3.Manifold.cube((5, 1e-5, 20)).translate((-1, 5, -5))
+    # Two blocks a tenth of a nanometre apart but joined elsewhere: rounding closes the slit.
+    slit = m3.Manifold.cube((10, 10, 10)) - m3.Manifold.cube((5, 1e-7, 20)).translate((-1, 5, -5))
     vertices, faces = _mesh(slit)
     assert not is_closed(weld(vertices, faces)[1])
     points, triangles = printable_mesh(BodyMesh("body-00", vertices, faces))
@@ -74,7 +74,7 @@ def test_printable_mesh_closes_a_sliver_that_rounding_pinches():
 def test_printable_mesh_says_which_body_cannot_be_closed():
     vertices, faces = _mesh(m3.Manifold.cube((1, 1, 1)))
     with pytest.raises(GeometryError, match="body-07"):
-        printable_mesh(BodyMesh("body-07", vertices * 1e-7, faces))
+        printable_mesh(BodyMesh("body-07", vertices * 1e-7 + 10, faces))
 
 
 # STL ------------------------------------------------------------------------------------------

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
 from fabfold.export.colours import palette
-from fabfold.export.weld import DECIMALS, printable_mesh
+from fabfold.export.weld import printable_mesh
 from fabfold.files import replacing
 from fabfold.joinery.model import Joinery
 
@@ -58,6 +58,8 @@ _KNOWN = frozenset(
         "Application",
     }
 )
+#: Decimal places of a millimetre that the file keeps.
+_DECIMALS = 6
 _NAMESPACE = "urn:fabfold:kit"
 _RELATIONSHIP = "urn:fabfold:slicer-settings"
 _UNIT_MATRIX = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
@@ -123,7 +125,7 @@ def write_3mf(
 
     if colours is None:
         colours = palette(len(joinery.bodies))
-    meshes = [printable_mesh(body) for body in joinery.bodies]
+    meshes = [printable_mesh(body, _DECIMALS) for body in joinery.bodies]
     names = [body.name for body in joinery.bodies]
     facts = {"Title": title, "Application": f"fabfold {__version__}", **(metadata or {})}
     # UUIDs are made from the content's name, never drawn, so that two writes agree.
@@ -142,7 +144,7 @@ def write_3mf(
         for name, colour in zip(names, colours, strict=True)
     ]
     lowest = np.min([vertices.min(axis=0) for vertices, _ in meshes], axis=0)
-    place = _translation(lib3mf, -np.round(lowest.astype(float), DECIMALS))
+    place = _translation(lib3mf, -np.round(lowest.astype(float), _DECIMALS))
     model.SetBuildUUID(str(uuid.uuid5(space, "build")))
     if layout == "merged":
         whole = _add_merged(lib3mf, model, title, meshes, materials.GetResourceID(), paints)
@@ -175,7 +177,7 @@ def write_3mf(
         attachment = model.AddAttachment(f"/Metadata/{file_name}", _RELATIONSHIP)
         attachment.ReadFromBuffer(text.encode("utf-8"))
     writer = model.QueryWriter("3mf")
-    writer.SetDecimalPrecision(DECIMALS)
+    writer.SetDecimalPrecision(_DECIMALS)
     with replacing(path) as temporary:
         writer.WriteToFile(str(temporary))
         temporary.write_bytes(_repacked(temporary.read_bytes()))

@@ -15,17 +15,14 @@ from fabfold.errors import GeometryError
 from fabfold.joinery.model import BodyMesh
 from fabfold.meshes import mesh_volume
 
-__all__ = ["DECIMALS", "is_closed", "printable_mesh", "weld"]
-
-#: Decimal places of a millimetre that exported coordinates keep.
-DECIMALS = 4
+__all__ = ["is_closed", "printable_mesh", "weld"]
 
 #: Edges shorter than these are collapsed, in mm, until the rounded mesh is closed.
 _TOLERANCES_MM = (0.0, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
 
 
 def weld(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32]
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], decimals: int | None = None
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Round corners, join those that fall together, and drop the triangles that collapse.
 
@@ -34,15 +31,18 @@ def weld(
     vertices : (v, 3) float64 array
         In mm.
     faces : (f, 3) int32 array
+    decimals : int, optional
+        Round to so many decimals before single precision, for a format that holds decimals.
 
     Returns
     -------
     vertices : (w, 3) float32 array
-        Distinct points with :data:`DECIMALS` decimals, in order of first use.
+        Distinct points, in order of first use.
     faces : (g, 3) int32 array
         Triangles with three different corners, in the order of `faces`.
     """
-    rounded = np.round(np.asarray(vertices, dtype=np.float64), DECIMALS).astype(np.float32)
+    exact = np.asarray(vertices, dtype=np.float64)
+    rounded = (exact if decimals is None else np.round(exact, decimals)).astype(np.float32)
     rounded += np.float32(0.0)  # -0.0 and 0.0 are one point
     corners = rounded[faces.reshape(-1)]
     _, first, inverse = np.unique(corners, axis=0, return_index=True, return_inverse=True)
@@ -75,12 +75,16 @@ def is_closed(faces: NDArray[np.int32]) -> bool:
     return bool((forward[1:] != forward[:-1]).all() and (forward == backward).all())
 
 
-def printable_mesh(body: BodyMesh) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+def printable_mesh(
+    body: BodyMesh, decimals: int | None = None
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """A body's mesh as files hold it: rounded, welded, closed and oriented outwards.
 
     Parameters
     ----------
     body : BodyMesh
+    decimals : int, optional
+        See :func:`weld`.
 
     Returns
     -------
@@ -96,14 +100,14 @@ def printable_mesh(body: BodyMesh) -> tuple[NDArray[np.float32], NDArray[np.int3
     wanted = mesh_volume(body.vertices, body.faces)
     for tolerance in _TOLERANCES_MM:
         vertices, faces = _simplified(body, tolerance) if tolerance else (body.vertices, body.faces)
-        points, triangles = weld(vertices, faces)
+        points, triangles = weld(vertices, faces, decimals)
         if is_closed(triangles):
             volume = mesh_volume(points.astype(np.float64), triangles)
             if abs(volume - wanted) <= 1e-3 * abs(wanted) and volume > 0:
                 return points, triangles
     raise GeometryError(
         f"{body.name}: the mesh ({len(body.faces)} triangles, {wanted:.1f} mm³) does not stay "
-        f"closed when its corners are rounded to {10.0**-DECIMALS:g} mm, even after edges up to "
+        f"closed when its corners are rounded to single precision, even after edges up to "
         f"{_TOLERANCES_MM[-1]:g} mm are collapsed; make the kit with larger voxels or another seed"
     )
 
