@@ -1,0 +1,208 @@
+"""Read a model of any supported format and make one closed solid of it.
+
+The stages: read (with the checks that make errors speak plainly), bring to unit size, close the
+surface, unite the shells, keep one piece, thin dense meshes, and go back to the model's own units.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from fabfold.errors import ModelError
+from fabfold.files import sha256_of
+from fabfold.solid.model import Solid
+from fabfold.solid.raw import RawMesh
+from fabfold.solid.surface import OpenSurfaceError, close_surface
+from fabfold.solid.topology import Points
+from fabfold.solid.unite import one_piece, simplify, to_mesh, unite
+
+__all__ = ["FORMATS", "load_solid", "solid_from_mesh"]
+
+#: Suffixes that can be read.
+FORMATS = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".step", ".stp")
+#: Denser meshes are thinned: a box of some hundred voxels shows nothing of the rest.
+MAX_TRIANGLES = 200_000
+#: Smallest thickness of the whole model as a share of its longest side.
+MIN_THICKNESS = 0.01
+#: A 32-bit file must resolve the model at least this finely.
+MIN_STEPS = 1_000
+
+
+def load_solid(source: str | Path) -> Solid:
+    """Load a model as one closed, outward-oriented manifold.
+
+    Parameters
+    ----------
+    source : str or Path
+        A file in one of :data:`FORMATS`, or ``"sample:NAME"`` for a built-in sample.
+
+    Returns
+    -------
+    Solid
+        In the model's own units and place; `notes` says what was repaired.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be read or is not one solid; the message names the file, the cause and
+        what to do.
+
+    Notes
+    -----
+    The rules: overlapping shells are united (inside is where the winding number of the shells,
+    each turned outwards, is at least 1); closed cavities are filled; loose pieces are dropped if
+    together they are at most 5 % of the volume, and refused otherwise; holes are capped where the
+    caps are small beside the surface; meshes above 200,000 triangles are thinned; a model thinner
+    than 1 % of its longest side is refused.
+    """
+    text = str(source)
+    if text.startswith("sample:"):
+        from fabfold.solid.samples import load_sample
+
+        return load_sample(text.removeprefix("sample:"))
+    path = Path(source)
+    read = _reader(path)
+    try:
+        raw = read(path)
+        digest = sha256_of(path)
+    except OSError as error:
+        raise ModelError(f"{path.name} cannot be read: {error.strerror or error}") from error
+    return solid_from_mesh(path.stem, raw, digest, label=path.name)
+
+
+def _reader(path: Path) -> Callable[[Path], RawMesh]:
+    from fabfold.solid import read_binary, read_stl, read_text
+
+    readers = {
+        ".stl": read_stl.read_stl,
+        ".obj": read_text.read_obj,
+        ".off": read_text.read_off,
+        ".ply": read_binary.read_ply,
+        ".glb": read_binary.read_glb,
+        ".3mf": read_binary.read_3mf,
+        ".step": read_binary.read_step,
+        ".stp": read_binary.read_step,
+    }
+    known = ", ".join(suffix[1:].upper() for suffix in FORMATS if suffix != ".stp")
+    if path.is_dir():
+        raise ModelError(f"{path} is a folder: give the model file itself ({known})")
+    if not path.exists():
+        raise ModelError(f"{path}: there is no such file")
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise ModelError(
+            f"{path.name}: files ending in {path.suffix or 'nothing'} cannot be read; "
+            f"export the model as one of {known}"
+        )
+    if path.stat().st_size == 0:
+        raise ModelError(f"{path.name} is empty (0 bytes): export or download it again")
+    return reader
+
+
+def solid_from_mesh(name: str, raw: RawMesh, sha256: str = "", label: str = "") -> Solid:
+    """Make a solid of triangles by the rules of :func:`load_solid`.
+
+    Parameters
+    ----------
+    name : str
+        Name of the solid.
+    raw : RawMesh
+    sha256 : str, optional
+        Digest of the file.
+    label : str, optional
+        What messages call the model; `name` if not given.
+
+    Raises
+    ------
+    ModelError
+        If the triangles cannot be made one solid.
+    """
+    label = label or name
+    _check_numbers(label, raw)
+    vertices, centre, scale = _normalised(label, raw)
+    notes = list(raw.notes)
+    try:
+        shells, done = close_surface(label, vertices, raw.faces)
+    except OpenSurfaceError as error:
+        from fabfold.solid.wrap import wrap_surface
+
+        shells, done = wrap_surface(label, vertices, raw.faces, str(error.args[0]))
+    notes += done
+    body = one_piece(label, unite(label, shells, notes), notes)
+    before = body.num_tri()
+    if before > MAX_TRIANGLES:
+        body = simplify(body, MAX_TRIANGLES)
+        notes.append(f"{before:,} triangles were thinned to {body.num_tri():,}")
+    points, faces = to_mesh(body)
+    return Solid(
+        name=name,
+        vertices=np.ascontiguousarray(points * scale + centre),
+        faces=np.ascontiguousarray(faces, dtype=np.int32),
+        notes=tuple(notes),
+        sha256=sha256 or hashlib.sha256(raw.vertices.tobytes() + raw.faces.tobytes()).hexdigest(),
+    )
+
+
+def _check_numbers(label: str, raw: RawMesh) -> None:
+    if len(raw.faces) and (raw.faces.min() < 0 or raw.faces.max() >= len(raw.vertices)):
+        bad = int(np.flatnonzero((raw.faces < 0).any(1) | (raw.faces >= len(raw.vertices)).any(1))[0])
+        raise ModelError(
+            f"{label}: triangle {bad} names a vertex that is not there "
+            f"(the file has {len(raw.vertices)}); export it again"
+        )
+    finite = np.isfinite(raw.vertices).all(axis=1)
+    if not finite.all():
+        bad_vertex = int(np.flatnonzero(~finite)[0])
+        bad_faces = np.flatnonzero(~finite[raw.faces].all(axis=1))
+        where = f"; the first is triangle {bad_faces[0]}" if len(bad_faces) else ""
+        raise ModelError(
+            f"{label}: {len(bad_faces)} triangles have corners that are not finite numbers "
+            f"(NaN or infinite), the first such vertex is number {bad_vertex} counted from "
+            f"0{where}; repair or export the model again"
+        )
+
+
+def _normalised(label: str, raw: RawMesh) -> tuple[Points, Points, float]:
+    """Vertices about the origin with a longest side of 0.5 to 1, and the way back.
+
+    Models come a nanometre or a thousand kilometres long: all tolerances hold for this frame.
+    """
+    used = raw.vertices[np.unique(raw.faces)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    longest = float((high - low).max())
+    far = float(np.abs(used).max())
+    if longest == 0:
+        raise ModelError(f"{label} is not a solid: all its corners are one point")
+    if not np.isfinite(longest) or not 1e-100 < longest < 1e100:
+        raise ModelError(f"{label}: a size of {longest:g} is beyond reckoning; scale the model")
+    if raw.float32 and (step := float(np.spacing(np.float32(far)))) * MIN_STEPS > longest:
+        raise ModelError(
+            f"{label}: its precision is lost, since the model is {longest:.3g} long but stands "
+            f"{far:.3g} from the origin, where the file can only store steps of {step:.3g}; move "
+            "it to the origin and export it again"
+        )
+    # A power of two scales without rounding.
+    scale = float(2.0 ** np.ceil(np.log2(longest)))
+    centre = (low + high) / 2
+    _check_thickness(label, (used - centre) / longest)
+    return (raw.vertices - centre) / scale, centre, scale
+
+
+def _check_thickness(label: str, points: Points) -> None:
+    """Refuse what is flat or next to it, along the axes and along its own principal axes."""
+    _, axes = np.linalg.eigh(np.cov(points.T))
+    sides = np.r_[np.ptp(points, axis=0), np.ptp(points @ axes, axis=0)]
+    if sides.min() < 1e-7:
+        raise ModelError(
+            f"{label} is not a solid: all its corners lie in one plane and its volume is zero; "
+            "give it a thickness"
+        )
+    if sides.min() < MIN_THICKNESS:
+        raise ModelError(
+            f"{label} is too thin to fold: its thickness is {sides.min():.2g} of its length, and "
+            f"at least {MIN_THICKNESS:g} is needed; make it thicker or shorter"
+        )

@@ -1,0 +1,80 @@
+"""What a reader hands on: triangles as the file gives them, nothing repaired yet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.errors import ModelError
+
+__all__ = ["RawMesh", "no_faces", "what_is_it"]
+
+#: How the bytes of files begin that people rename by mistake.
+_SIGNATURES: tuple[tuple[bytes, str], ...] = (
+    (b"\x89PNG", "a PNG picture"),
+    (b"\xff\xd8\xff", "a JPEG picture"),
+    (b"GIF8", "a GIF picture"),
+    (b"%PDF", "a PDF document"),
+    (b"PK\x03\x04", "a ZIP archive (3MF files are such archives)"),
+    (b"glTF", "a GLB model"),
+    (b"ply", "a PLY model"),
+    (b"OFF", "an OFF model"),
+    (b"ISO-10303-21", "a STEP file"),
+    (b"Kaydara FBX", "an FBX model"),
+    (b"BLENDER", "a Blender file"),
+    (b"\x1f\x8b", "a gzip archive"),
+    (b"<", "an XML or HTML text"),
+)
+
+
+@dataclass(frozen=True)
+class RawMesh:
+    """Triangles as read.
+
+    Attributes
+    ----------
+    vertices : (v, 3) float64 array
+        Corner coordinates in the file's unit; corners may be repeated.
+    faces : (f, 3) int64 array
+        Corner indices, each within ``range(v)``.
+    notes : tuple of str
+        What the reader had to assume.
+    float32 : bool
+        Whether the file stores coordinates in 32 bits.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    notes: tuple[str, ...] = ()
+    float32: bool = False
+
+
+def no_faces(name: str, found: str = "") -> ModelError:
+    """The error for a readable file that holds no triangle."""
+    return ModelError(
+        f"{name} has no triangles{found}: there is no surface to fold; "
+        "export the model as a closed mesh"
+    )
+
+
+def what_is_it(head: bytes) -> str:
+    """Name the content of a file by its first bytes, for messages about renamed files."""
+    for signature, meaning in _SIGNATURES:
+        if head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(signature):
+            return meaning
+    return "plain text" if is_text(head) else "binary data"
+
+
+def is_text(head: bytes) -> bool:
+    """Whether the first bytes of a file look like text (no control characters)."""
+    allowed = {9, 10, 11, 12, 13}
+    return all(byte >= 32 or byte in allowed for byte in head)
+
+
+def head_of(path: Path, size: int = 1024) -> bytes:
+    """The first bytes of a file."""
+    with path.open("rb") as stream:
+        return stream.read(size)

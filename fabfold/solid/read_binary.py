@@ -1,0 +1,241 @@
+"""PLY, GLB, 3MF and STEP: checked for length first, then read by the libraries that know them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fabfold.errors import ModelError
+from fabfold.solid.raw import RawMesh, head_of, no_faces, what_is_it
+from fabfold.solid.tessellate import tessellate
+
+__all__ = ["read_3mf", "read_glb", "read_ply", "read_step"]
+
+_PLY_BYTES = {
+    "char": 1, "uchar": 1, "int8": 1, "uint8": 1,
+    "short": 2, "ushort": 2, "int16": 2, "uint16": 2,
+    "int": 4, "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4,
+    "double": 8, "float64": 8, "int64": 8, "uint64": 8,
+}  # fmt: skip
+
+
+def read_ply(path: Path) -> RawMesh:
+    """Read a PLY file, ASCII or binary.
+
+    Raises
+    ------
+    ModelError
+        If the file is no PLY, is shorter than its header says, or has no faces.
+    """
+    counts, single = _check_ply(path)
+    if not counts.get("face"):
+        raise no_faces(path.name, f" ({counts.get('vertex', 0)} points only)")
+    mesh = _load_with_trimesh(path, "ply")
+    if len(mesh.vertices) < counts.get("vertex", 0) or len(mesh.faces) < counts["face"]:
+        raise ModelError(
+            f"{path.name} is damaged: its header says {counts.get('vertex', 0)} vertices and "
+            f"{counts['face']} faces, but {len(mesh.vertices)} and {len(mesh.faces)} could be "
+            "read; export it again"
+        )
+    return RawMesh(
+        np.asarray(mesh.vertices, dtype=np.float64),
+        np.asarray(mesh.faces, dtype=np.int64),
+        float32=single,
+    )
+
+
+def _check_ply(path: Path) -> tuple[dict[str, int], bool]:
+    """Element counts of a PLY header, compared with the size of the file."""
+    with path.open("rb") as stream:
+        if stream.readline(16).strip() != b"ply":
+            raise ModelError(
+                f"{path.name} is not a PLY file but {what_is_it(head_of(path))}; "
+                "export the model as PLY, or give the file its right suffix"
+            )
+        counts: dict[str, int] = {}
+        widths: dict[str, int] = {}
+        form, single, element = "", False, ""
+        for number in range(2, 1000):
+            words = stream.readline(4096).decode("ascii", "replace").split()
+            if words[:1] == ["end_header"]:
+                break
+            if words[:1] == ["format"] and len(words) > 1:
+                form = words[1]
+            elif words[:1] == ["element"] and len(words) == 3 and words[2].isdigit():
+                element = words[1]
+                counts[element], widths[element] = int(words[2]), 0
+            elif words[:1] == ["property"] and element:
+                # A list takes at least its own count.
+                kind = words[2] if len(words) > 4 and words[1] == "list" else words[1]
+                widths[element] += _PLY_BYTES.get(kind, 1)
+                single = single or (words[-1] == "x" and kind in ("float", "float32"))
+            elif words[:1] not in (["comment"], ["obj_info"]):
+                raise ModelError(
+                    f"{path.name}, line {number}: not a line of a PLY header; export it again"
+                )
+        else:
+            raise ModelError(f"{path.name}: the PLY header has no end; export it again")
+        body = path.stat().st_size - stream.tell()
+        binary = form.startswith("binary")
+        least = sum(n * (widths[kind] if binary else 2) for kind, n in counts.items())
+        if body + 1 < least:
+            raise ModelError(
+                f"{path.name} ends early: its header asks for at least {least:,} bytes of data, "
+                f"and {body:,} follow; export or download it again"
+            )
+    return counts, single and binary
+
+
+def read_glb(path: Path) -> RawMesh:
+    """Read every mesh of a binary glTF scene, placed by its node, turned from y up to z up.
+
+    Raises
+    ------
+    ModelError
+        If the file is no GLB, is cut off, or has no triangles.
+    """
+    head = head_of(path)
+    if head[:4] != b"glTF":
+        raise ModelError(
+            f"{path.name} is not a GLB file but {what_is_it(head)}; export the model as GLB"
+        )
+    length, size = int.from_bytes(head[8:12], "little"), path.stat().st_size
+    if length > size:
+        raise ModelError(
+            f"{path.name} ends early: its header says {length:,} bytes, the file has {size:,}; "
+            "export or download it again"
+        )
+    mesh = _load_with_trimesh(path, "glb")
+    x, y, z = np.asarray(mesh.vertices, dtype=np.float64).T
+    return RawMesh(
+        np.column_stack([x, -z, y]),
+        np.asarray(mesh.faces, dtype=np.int64),
+        ("turned from the y-up of GLB files to z up",),
+        float32=True,
+    )
+
+
+def _load_with_trimesh(path: Path, kind: str) -> Any:
+    import trimesh
+
+    try:
+        with path.open("rb") as stream:
+            mesh = trimesh.load_mesh(stream, file_type=kind, process=False)
+    except Exception as error:  # readers of damaged files fail in every way there is
+        raise ModelError(
+            f"{path.name} cannot be read as {kind.upper()} ({type(error).__name__}: "
+            f"{str(error)[:120]}); export the model again"
+        ) from error
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise no_faces(path.name)
+    return mesh
+
+
+def read_3mf(path: Path) -> RawMesh:
+    """Read the build items of a 3MF file, each mesh placed by its transforms.
+
+    Raises
+    ------
+    ModelError
+        If lib3mf cannot read the file, or nothing in it has triangles.
+    """
+    import lib3mf
+
+    head = head_of(path)
+    if head[:2] != b"PK":
+        raise ModelError(
+            f"{path.name} is not a 3MF file but {what_is_it(head)}; export the model as 3MF"
+        )
+    wrapper = lib3mf.get_wrapper()
+    model = wrapper.CreateModel()
+    parts: list[tuple[Any, Any]] = []
+    try:
+        model.QueryReader("3mf").ReadFromFile(str(path))
+        items = model.GetBuildItems()
+        while items.MoveNext():
+            item = items.GetCurrent()
+            place = _affine(item.GetObjectTransform()) if item.HasObjectTransform() else np.eye(4)
+            _collect(item.GetObjectResource(), place, parts)
+    except lib3mf.ELib3MFException as error:
+        raise ModelError(
+            f"{path.name} cannot be read as 3MF ({str(error)[:160]}); export the model again"
+        ) from error
+    if not parts:
+        raise no_faces(path.name)
+    offsets = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
+    faces = [part[1] + offset for part, offset in zip(parts, offsets, strict=False)]
+    return RawMesh(
+        np.concatenate([vertices for vertices, _ in parts]), np.concatenate(faces), float32=True
+    )
+
+
+def _affine(transform: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    matrix = np.eye(4)
+    matrix[:3, :] = np.array([list(row) for row in transform.Fields], dtype=float).T
+    return matrix
+
+
+def _collect(resource: Any, place: Any, parts: list[tuple[Any, Any]]) -> None:
+    """Append the placed meshes of a 3MF object and of its components to `parts`."""
+    if resource.IsMeshObject():
+        if not resource.GetTriangleCount():
+            return
+        vertices = np.array([list(v.Coordinates) for v in resource.GetVertices()], dtype=float)
+        faces = np.array([list(t.Indices) for t in resource.GetTriangleIndices()], dtype=np.int64)
+        if np.linalg.det(place[:3, :3]) < 0:
+            faces = faces[:, ::-1]
+        parts.append((vertices @ place[:3, :3].T + place[:3, 3], faces))
+    elif resource.IsComponentsObject():
+        for index in range(resource.GetComponentCount()):
+            component = resource.GetComponent(index)
+            own = _affine(component.GetTransform()) if component.HasTransform() else np.eye(4)
+            _collect(component.GetObjectResource(), place @ own, parts)
+
+
+def read_step(path: Path) -> RawMesh:
+    """Read all solids of a STEP file and cut their surfaces into triangles.
+
+    Raises
+    ------
+    ModelError
+        If the file is cut off, cannot be read, or has no solid.
+    """
+    import build123d
+
+    head = head_of(path)
+    if not head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"ISO-10303-21"):
+        raise ModelError(
+            f"{path.name} is not a STEP file but {what_is_it(head)}; export the model as STEP"
+        )
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        stream.seek(max(0, size - 256))
+        tail = stream.read()
+    if b"END-ISO-10303-21" not in tail:
+        raise ModelError(
+            f"{path.name} is incomplete: a STEP file ends with END-ISO-10303-21, this one was cut "
+            "off; export or download it again"
+        )
+    try:
+        shape = build123d.import_step(path)
+    except Exception as error:  # the kernel reports bad files by exceptions of many types
+        raise ModelError(
+            f"{path.name} cannot be read as STEP ({str(error)[:160]}); export the model again"
+        ) from error
+    solids = list(shape.solids())
+    if not solids:
+        raise ModelError(
+            f"{path.name} has no solid in it: only a solid body can be folded; export the part "
+            "itself, not its sketches or surfaces"
+        )
+    notes = (f"{len(solids)} separate solids were read",) if len(solids) > 1 else ()
+    box = build123d.Compound(solids).bounding_box()
+    parts = [tessellate(solid, max(box.size.X, box.size.Y, box.size.Z)) for solid in solids]
+    offsets = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
+    return RawMesh(
+        np.concatenate([vertices for vertices, _ in parts]),
+        np.concatenate([part[1] + offset for part, offset in zip(parts, offsets, strict=False)]),
+        notes,
+    )

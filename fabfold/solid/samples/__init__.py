@@ -1,0 +1,123 @@
+"""Built-in samples: models of our own, drawn with build123d, to fold without a file at hand."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fabfold.errors import GeometryError, ModelError
+from fabfold.solid.model import Solid
+
+if TYPE_CHECKING:
+    import build123d
+
+__all__ = ["Sample", "build_sample", "load_sample", "sample", "sample_names"]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A built-in model.
+
+    Attributes
+    ----------
+    name : str
+        As in ``sample:NAME``.
+    title : str
+        What it shows, in a few words.
+    template : str
+        The box that it is meant for.
+    version : int
+        Counts changes of the shape.
+    """
+
+    name: str
+    title: str
+    template: str
+    version: int
+
+
+_SAMPLES = {
+    sample.name: sample
+    for sample in (
+        Sample("car", "a chunky little car", "box-3x4x4", 1),
+        Sample("duck", "a bath duck", "box-4x4x4", 1),
+        Sample("elephant", "an elephant with trunk and tusks", "box-5x5x5", 1),
+        Sample("locomotive", "a small steam locomotive", "box-4x4x5", 1),
+        Sample("rabbit", "a sitting rabbit", "box-4x4x4", 1),
+    )
+}
+
+
+def sample_names() -> list[str]:
+    """Names of the samples, sorted."""
+    return sorted(_SAMPLES)
+
+
+def sample(name: str) -> Sample:
+    """What is known of a sample before it is built.
+
+    Raises
+    ------
+    ModelError
+        If there is no such sample.
+    """
+    try:
+        return _SAMPLES[name]
+    except KeyError:
+        raise ModelError(
+            f"no sample {name!r}: there are {', '.join(sample_names())}"
+        ) from None
+
+
+def build_sample(name: str) -> build123d.Part:
+    """Draw a sample.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`sample_names`.
+
+    Returns
+    -------
+    build123d.Part
+        One valid solid that stands on z = 0 and looks along +x; about 10 mm a voxel.
+
+    Raises
+    ------
+    ModelError
+        If there is no such sample.
+    """
+    known = sample(name)
+    draw: Callable[[], Any] = import_module(f"{__name__}.{known.name}").draw
+    part = draw()
+    if len(part.solids()) != 1 or not part.is_valid:
+        raise GeometryError(f"sample {name!r} did not come out as one valid solid")
+    part.label = known.name
+    return part
+
+
+def load_sample(name: str) -> Solid:
+    """A sample as a closed manifold, the same bytes every time.
+
+    Raises
+    ------
+    ModelError
+        If there is no such sample.
+    """
+    from fabfold.solid.load import solid_from_mesh
+    from fabfold.solid.raw import RawMesh
+    from fabfold.solid.tessellate import tessellate
+
+    known = sample(name)
+    part = build_sample(name)
+    size = part.bounding_box().size
+    vertices, faces = tessellate(part, max(size.X, size.Y, size.Z), chord=0.001, angle=0.25)
+    digest = hashlib.sha256(f"sample:{known.name}:{known.version}".encode()).hexdigest()
+    # The kernel's last digits may differ between processors; a model is no finer than this.
+    solid = solid_from_mesh(known.name, RawMesh(np.round(vertices, 9), faces), digest)
+    return solid

@@ -1,0 +1,89 @@
+"""Round building blocks of the samples: ellipsoids, limbs, rounded slabs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+__all__ = ["both_sides", "cylinder_y", "ellipsoid", "fuse", "limb", "spheroid"]
+
+Triple = tuple[float, float, float]
+
+
+def ellipsoid(centre: Triple, radii: Triple, turn: Triple = (0, 0, 0)) -> Any:
+    """Ellipsoid with any three radii, turned by Euler angles (degrees, intrinsic XYZ)."""
+    from build123d import Location, Sphere, scale
+
+    body = scale(Sphere(1.0), by=radii)
+    return Location(centre, turn) * body
+
+
+def spheroid(centre: Triple, radius: float, half_length: float, turn: Triple = (0, 0, 0)) -> Any:
+    """Ellipsoid of revolution about its local z, an exact surface of revolution."""
+    from build123d import Axis, Ellipse, Location, Plane, Pos, Rectangle, revolve
+
+    half = Ellipse(radius, half_length) & Pos(radius, 0) * Rectangle(2 * radius, 3 * half_length)
+    return Location(centre, turn) * revolve(Plane.XZ * half, Axis.Z)
+
+
+def limb(points: Sequence[Triple], radii: Sequence[float], squash: float = 1.0) -> Any:
+    """Round limb through points: circles lofted along a curve, with ball ends.
+
+    Parameters
+    ----------
+    points : sequence of (x, y, z)
+        Where the middle line passes.
+    radii : sequence of float
+        Radius at each point.
+    squash : float, optional
+        Not 1 to make the sections elliptical: the factor of their second axis.
+    """
+    from build123d import Circle, Ellipse, Plane, Pos, Sphere, Spline, Vector, loft
+
+    line = Spline(*points) if len(points) > 2 else None
+    sections = []
+    for point, radius in zip(points, radii, strict=True):
+        if line is None:
+            tangent = Vector(*points[-1]) - Vector(*points[0])
+        else:
+            tangent = line.tangent_at(Vector(*point))
+        plane = Plane(origin=point, x_dir=_across(tangent), z_dir=tangent)
+        flat = Circle(radius) if squash == 1.0 else Ellipse(radius, radius * squash)
+        sections.append(plane * flat)
+    body = loft(sections)
+    if squash == 1.0:
+        for end in (0, -1):
+            body = body + Pos(*points[end]) * Sphere(radii[end])
+    return body
+
+
+def _across(tangent: Any) -> Any:
+    from build123d import Vector
+
+    side = Vector(0, 1, 0).cross(tangent)
+    return side if side.length > 1e-6 else Vector(1, 0, 0)
+
+
+def both_sides(shape: Any) -> list[Any]:
+    """A shape and its mirror image in the plane y = 0."""
+    from build123d import Plane, mirror
+
+    return [shape, mirror(shape, about=Plane.XZ)]
+
+
+def fuse(parts: Sequence[Any]) -> Any:
+    """Union of all parts as one Part."""
+    from build123d import Compound, Part
+
+    whole = parts[0].fuse(*parts[1:]) if len(parts) > 1 else parts[0]
+    return Part(Compound(list(whole.solids())).wrapped)
+
+
+def cylinder_y(centre: Triple, radius: float, width: float, round_by: float = 0.0) -> Any:
+    """Cylinder along y, its rims rounded by `round_by` if that is not 0."""
+    from build123d import Cylinder, Location, fillet
+
+    body = Cylinder(radius, width)
+    if round_by:
+        body = fillet(body.edges().filter_by(lambda edge: edge.geom_type.name == "CIRCLE"), round_by)
+    return Location(centre, (90, 0, 0)) * body

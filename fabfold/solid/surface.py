@@ -1,0 +1,225 @@
+"""Close a surface: drop what does not belong, wind it alike, cap its holes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.errors import ModelError
+from fabfold.solid.polygon import triangulate_loop
+from fabfold.solid.topology import (
+    Edges,
+    Faces,
+    Points,
+    face_areas,
+    orient,
+    patches,
+    shells,
+    weld,
+    weld_rims,
+)
+
+__all__ = ["Shell", "close_surface"]
+
+#: A patch whose caps would be larger than this share of its own area is a sheet, not a body.
+CAP_SHARE = 0.6
+#: Sheets are dropped if together they have at most this share of the whole area.
+SHEET_SHARE = 0.15
+#: Rims of neighbouring faces are joined over gaps of at most these shares of the longest side.
+RIM_TOLERANCES = (1e-7, 1e-6, 1e-5, 1e-4)
+#: A surface with a larger share of open edges than this is a soup of triangles.
+SOUP_SHARE = 0.5
+#: Faces with an area of less than this times the square of the longest side count as none.
+NO_AREA = 1e-14
+
+
+@dataclass(frozen=True)
+class Shell:
+    """One closed surface, as yet of either orientation."""
+
+    vertices: Points
+    faces: Faces
+
+
+class OpenSurfaceError(Exception):
+    """The surface is too open to be closed by capping holes; `args[0]` says why."""
+
+
+def close_surface(name: str, vertices: Points, faces: Faces) -> tuple[list[Shell], list[str]]:
+    """Make closed shells of a triangle mesh whose longest side is about 1.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, for messages.
+    vertices : (v, 3) float64 array
+    faces : (f, 3) int64 array
+
+    Returns
+    -------
+    shells : list of Shell
+        Each closed by itself; they may overlap, nest, and be inside out.
+    notes : list of str
+        What was done.
+
+    Raises
+    ------
+    ModelError
+        If the mesh is a soup of triangles.
+    OpenSurfaceError
+        If it is a surface, but too open to be capped.
+    """
+    notes: list[str] = []
+    vertices, faces = weld(vertices, faces)
+    if len(faces) and not Edges.of(faces).closed:
+        faces = _sew(vertices, faces)
+    if len(faces) == 0:
+        raise ModelError(f"{name} has no volume: all its triangles are points or lines")
+    edges = Edges.of(faces)
+    if edges.closed:
+        return _split(vertices, faces), notes
+    if (edges.count == 1).sum() > SOUP_SHARE * len(edges.count):
+        raise ModelError(
+            f"{name} is not a closed surface: {int((edges.count == 1).sum())} of its "
+            f"{len(edges.count)} edges have one face only, the {len(faces)} triangles are hardly "
+            "joined; export the model as one closed solid"
+        )
+    faces = _drop_faces(vertices, faces, notes)
+    faces, turned, one_sided = orient(faces)
+    if turned:
+        notes.append(f"{turned} triangles faced the wrong way and were turned")
+    if one_sided:
+        raise OpenSurfaceError("part of the surface is one-sided")
+    edges = Edges.of(faces)
+    if edges.closed:
+        return _split(vertices, faces), notes
+    return _cap(vertices, faces, notes), notes
+
+
+def _sew(vertices: Points, faces: Faces) -> Faces:
+    """Join open rims over small gaps, with the smallest tolerance that leaves fewest open edges."""
+    best, fewest = faces, Edges.of(faces).odd
+    for tolerance in RIM_TOLERANCES:
+        if fewest == 0:
+            break
+        sewn = weld_rims(vertices, faces, tolerance)
+        if len(sewn) and (odd := Edges.of(sewn).odd) < fewest:
+            best, fewest = sewn, odd
+    return best
+
+
+def _drop_faces(vertices: Points, faces: Faces, notes: list[str]) -> Faces:
+    """Drop repeated faces and faces without area where the surface is more closed for it."""
+    _, first, index, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    if len(first) < len(faces):
+        once = faces[np.sort(first)]
+        never = faces[count[index.ravel()] == 1]
+        # Two equal faces are either written twice or are a wall inside the model.
+        wall = len(never) > 0 and Edges.of(never).odd < Edges.of(once).odd
+        kept = never if wall else once
+        notes.append(
+            f"{len(faces) - len(kept)} "
+            + ("triangles of inner walls were dropped" if wall else "repeated triangles were dropped")
+        )
+        faces = kept
+    flat = face_areas(vertices, faces) < NO_AREA
+    if flat.any() and not flat.all():
+        rest = faces[~flat]
+        if Edges.of(rest).odd < Edges.of(faces).odd:
+            notes.append(f"{int(flat.sum())} triangles without area were dropped")
+            faces = rest
+    return faces
+
+
+def _split(vertices: Points, faces: Faces) -> list[Shell]:
+    label = shells(faces)
+    order = np.argsort(label, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    return [_shell(vertices, faces[part]) for part in parts]
+
+
+def _shell(vertices: Points, faces: Faces) -> Shell:
+    used, index = np.unique(faces.ravel(), return_inverse=True)
+    return Shell(vertices[used], index.reshape(-1, 3).astype(np.int64))
+
+
+def _cap(vertices: Points, faces: Faces, notes: list[str]) -> list[Shell]:
+    """Cap the holes of every open patch; drop the patches that are mere sheets."""
+    label = patches(faces)
+    order = np.argsort(label, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    areas = face_areas(vertices, faces)
+    found: list[Shell] = []
+    sheets, sheet_area, holes, cap_area = 0, 0.0, 0, 0.0
+    for part in parts:
+        own = faces[part]
+        edges = Edges.of(own)
+        if edges.closed:
+            found.append(_shell(vertices, own))
+            continue
+        loops = _loops(own, edges)
+        caps = [loop[triangulate_loop(vertices[loop])] for loop in loops]
+        cap = np.concatenate(caps)
+        covered = float(face_areas(vertices, cap).sum())
+        if covered > CAP_SHARE * areas[part].sum():
+            sheets += 1
+            sheet_area += float(areas[part].sum())
+            continue
+        holes += len(loops)
+        cap_area += covered
+        found.append(_shell(vertices, np.concatenate([own, cap])))
+    share = sheet_area / float(areas.sum())
+    if not found or share > SHEET_SHARE:
+        raise OpenSurfaceError(
+            f"{sheets} of its {len(parts)} surfaces are open sheets ({share:.0%} of the area)"
+        )
+    if holes:
+        notes.append(
+            f"{holes} {'hole was' if holes == 1 else 'holes were'} capped "
+            f"({cap_area / (areas.sum() + cap_area):.1%} of the surface)"
+        )
+    if sheets:
+        notes.append(
+            f"{sheets} open {'sheet' if sheets == 1 else 'sheets'} without thickness "
+            f"({share:.1%} of the surface) {'was' if sheets == 1 else 'were'} dropped"
+        )
+    return found
+
+
+def _loops(faces: Faces, edges: Edges) -> list[NDArray[np.int64]]:
+    """Rims of the holes of a patch as vertex loops, in the direction that a cap needs.
+
+    A rim that passes a vertex twice is split there, so each loop is simple.
+    """
+    open_sides = edges.balance[edges.of_side] != 0
+    starts = faces[open_sides]
+    ends = np.roll(faces, -1, axis=1)[open_sides]
+    following: dict[int, list[int]] = {}
+    for start, end in zip(ends.tolist(), starts.tolist(), strict=True):
+        following.setdefault(start, []).append(end)
+    loops: list[NDArray[np.int64]] = []
+    for seed in sorted(following):
+        while following[seed]:
+            trail = [seed]
+            place = {seed: 0}
+            while following.get(trail[-1]):
+                step = following[trail[-1]].pop()
+                if step in place:
+                    at = place[step]
+                    if len(trail) - at >= 3:
+                        loops.append(np.array(trail[at:], dtype=np.int64))
+                    for vertex in trail[at + 1 :]:
+                        del place[vertex]
+                    trail = trail[: at + 1]
+                else:
+                    place[step] = len(trail)
+                    trail.append(step)
+            if len(trail) > 1:
+                raise OpenSurfaceError("the rim of a hole does not close")
+    if not loops:
+        raise OpenSurfaceError("the rims of its holes cannot be followed")
+    return loops
