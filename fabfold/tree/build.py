@@ -11,9 +11,9 @@ from fabfold.lattice import ROTATIONS
 from fabfold.tree.grow import energy_of
 from fabfold.tree.model import Body, Edge, FoldTree, Hinge
 from fabfold.tree.problem import TreeProblem
-from fabfold.tree.rebuild import FACE_ARRAY, candidates, rooted, spanning_tree
+from fabfold.tree.rebuild import candidates, rooted, spanning_tree
 from fabfold.tree.system import HingeSystem
-from fabfold.tree.wedge import half_turn_table, side_table
+from fabfold.tree.wedge import hinge_tables
 
 __all__ = ["HingeChoice", "SpanningTree", "fold_tree", "hinge_choice"]
 
@@ -62,8 +62,10 @@ class HingeChoice:
     def wanted(self, keys: set[tuple[int, int]], bonus: float) -> NDArray[np.float64]:
         """Preference (smaller is sooner) for hinges between the voxel pairs of `keys`."""
         return np.array(
-            [-bonus if (int(u), int(v)) in keys or (int(v), int(u)) in keys else 0.0
-             for u, v in self.found[:, :2]]
+            [
+                -bonus if (int(u), int(v)) in keys or (int(v), int(u)) in keys else 0.0
+                for u, v in self.found[:, :2]
+            ]
         )
 
     def tree(
@@ -72,15 +74,16 @@ class HingeChoice:
         """One random spanning tree, or None where the hinges do not join all the clusters."""
         hinges = self.clusters - 1
         chosen = np.empty(hinges, np.int32)
-        if not spanning_tree(
+        left = spanning_tree(
             self.found, len(self.found), self.clusters, wanted, generator, chosen
-        ):
+        )
+        if left > 1:
             return None
         body = np.empty(len(self.label), np.int32)
         parent, row = np.empty(hinges, np.int32), np.empty(hinges, np.int32)
         axis, turns = np.empty(hinges, np.int8), np.empty(hinges, np.int8)
         rooted(
-            self.found, chosen, self.label, self.clusters, side_table(), FACE_ARRAY,
+            self.found, chosen, self.label, self.clusters, hinge_tables(),
             body, parent, axis, turns, row,
         )  # fmt: skip
         from_v = row < 0
@@ -104,9 +107,7 @@ def hinge_choice(problem: TreeProblem, pose: NDArray[np.int32]) -> HingeChoice:
     """Clusters and possible hinges of a full set of poses."""
     label = np.empty(len(problem), np.int32)
     found = np.empty((3 * len(problem), 12), np.int32)
-    total, rows = candidates(
-        problem.tables, pose, side_table(), FACE_ARRAY, half_turn_table(), label, found
-    )
+    total, rows = candidates(problem.tables, pose, hinge_tables(), label, found)
     return HingeChoice(problem, label, total, found[:rows])
 
 

@@ -6,6 +6,7 @@ Nothing here is shared with the search but the data classes and ``FoldTree.body_
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ def check_tree(tree: FoldTree) -> list[str]:
 
 def _shapes(tree: FoldTree) -> list[str]:
     count = len(tree.source)
-    wanted = {
+    wanted: dict[str, tuple[NDArray[Any], tuple[int, ...]]] = {
         "source": (tree.source, (count, 3)),
         "target": (tree.target, (count, 3)),
         "orientation": (tree.orientation, (count, 3, 3)),

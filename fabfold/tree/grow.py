@@ -1,5 +1,7 @@
 """Beam search that places voxels into the template (paper section 4)."""
 
+# mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
+
 from __future__ import annotations
 
 import numpy as np
@@ -53,9 +55,7 @@ def surface_of(tables: Tables, v: int, q: int) -> float:
 
 
 @njit(cache=True)
-def energy_of(
-    tables: Tables, pose: NDArray[np.int32], empty_face: float
-) -> tuple[float, int]:
+def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tuple[float, int]:
     """Weighted energy of a full set of poses and its number of rigid clusters.
 
     Parameters
@@ -144,7 +144,7 @@ def _survey(
             best = v
     if flood and best >= 0:
         head = 0
-        while head < seeds and seeds < left:
+        while head < seeds < left:
             cell = reach[len(taken) + head]
             head += 1
             for f in range(6):
@@ -254,9 +254,7 @@ def fill_beam(
         if start[v] >= 0:
             taken[0, 0, start[v] // 24] = True
     flood = len(todo) > 8
-    pick[0, 0] = _survey(
-        tables, pose[0, 0], taken[0, 0], todo, priority, mark, stamp, reach, flood
-    )
+    pick[0, 0] = _survey(tables, pose[0, 0], taken[0, 0], todo, priority, mark, stamp, reach, flood)
     if pick[0, 0] < 0:
         return 0, 1
     states = 1
@@ -319,7 +317,14 @@ def fill_beam(
             taken[nxt, kept, q // 24] = True
             if not last:
                 pick[nxt, kept] = _survey(
-                    tables, pose[nxt, kept], taken[nxt, kept], todo, priority, mark, stamp, reach,
+                    tables,
+                    pose[nxt, kept],
+                    taken[nxt, kept],
+                    todo,
+                    priority,
+                    mark,
+                    stamp,
+                    reach,
                     flood,
                 )
                 if pick[nxt, kept] < 0:

@@ -117,9 +117,7 @@ class TreeProblem:
         odd = int(parity(self.source).sum())
         voxels = (len(self.source) - odd, odd)
         cells = self.template.colours
-        fits = [
-            c for c in (0, 1) if voxels[0] <= cells[c] and voxels[1] <= cells[1 - c]
-        ]
+        fits = [c for c in (0, 1) if voxels[0] <= cells[c] and voxels[1] <= cells[1 - c]]
         if not fits:
             raise NoTreeError(
                 f"the voxels have {voxels[0]} cells of one checkerboard colour and {voxels[1]} of "
@@ -167,7 +165,7 @@ def _surface_table(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     # Face f of the cell in B is face turned[r, f] of the voxel in A.
     turned = np.array(
-        [[int(np.flatnonzero((FACES == d @ r).all(axis=1))[0]) for d in FACES] for r in ROTATIONS]
+        [[int(np.flatnonzero((d @ r == FACES).all(axis=1))[0]) for d in FACES] for r in ROTATIONS]
     )
     bits = (np.arange(64)[:, None] >> np.arange(6)) & 1
     by_face = np.asarray(depth, dtype=float)[:, turned]
@@ -232,7 +230,7 @@ def tree_problem(
     neighbour = np.full((count, 6), -1, dtype=np.int32)
     allowed = np.zeros((count, 6, len(joints)), dtype=bool)
     for (i, j), stiff, edges in zip(pairs, rigid, hinge, strict=True):
-        face = int(np.flatnonzero((FACES == cells[j] - cells[i]).all(axis=1))[0])
+        face = int(np.flatnonzero((cells[j] - cells[i] == FACES).all(axis=1))[0])
         # Both faces list the same edges in the same order, so one row serves either parent.
         for parent, child, side in ((i, j, face), (j, i, face ^ 1)):
             allowed[parent, side, 0] = stiff

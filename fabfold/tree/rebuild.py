@@ -1,18 +1,19 @@
 """From poses to joints: rigid clusters, possible hinges, and random spanning trees of them."""
 
+# mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
+
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.lattice import FACES
 from fabfold.tree.grow import clusters
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_float
-from fabfold.tree.wedge import blocked
+from fabfold.tree.wedge import HingeTables, blocked
 
-__all__ = ["candidates", "connected", "spanning_tree"]
+__all__ = ["candidates", "connected", "loose_pieces", "rooted", "spanning_tree"]
 
 
 @njit(cache=True)
@@ -51,9 +52,7 @@ def connected(tables: Tables, pose: NDArray[np.int32]) -> bool:
 def candidates(
     tables: Tables,
     pose: NDArray[np.int32],
-    sides: NDArray[np.int32],
-    faces: NDArray[np.int32],
-    swept: NDArray[np.bool_],
+    hinges: HingeTables,
     label: NDArray[np.int32],
     found: NDArray[np.int32],
 ) -> tuple[int, int]:
@@ -65,12 +64,7 @@ def candidates(
     ----------
     tables, pose
         A full set of poses.
-    sides : (6, 4) int32 array
-        Edges of each face, :func:`fabfold.tree.wedge.side_table`.
-    faces : (6, 3) int32 array
-        ``FACES``.
-    swept : bool array
-        :func:`fabfold.tree.wedge.half_turn_table`.
+    hinges : HingeTables
     label : (n,) int32 array
         Filled with the cluster of each voxel.
     found : (3 n, 12) int32 array
@@ -103,8 +97,8 @@ def candidates(
             if j < 1:
                 continue
             a, b = label[u], label[v]
-            d = faces[f]
-            n = faces[sides[f, j - 1]]
+            d = hinges.faces[f]
+            n = hinges.faces[hinges.sides[f, j - 1]]
             if blocked(
                 tables.source,
                 member[start[a] : start[a + 1]],
@@ -112,7 +106,7 @@ def candidates(
                 tables.source[u],
                 d,
                 n,
-                swept,
+                hinges.swept,
             ):
                 continue
             found[rows, 0] = u
@@ -149,7 +143,7 @@ def spanning_tree(
     wanted: NDArray[np.float64],
     generator: NDArray[np.uint64],
     chosen: NDArray[np.int32],
-) -> bool:
+) -> int:
     """Random spanning tree of the clusters.
 
     No two of its hinges share a lattice edge segment in A or in B (paper section 4.1, joint
@@ -168,8 +162,8 @@ def spanning_tree(
 
     Returns
     -------
-    bool
-        Whether it spans.
+    int
+        Number of pieces that remain: 1 when the tree spans.
     """
     link = np.arange(total).astype(np.int32)
     order = np.empty(rows)
@@ -202,7 +196,7 @@ def spanning_tree(
         link[a] = b
         chosen[kept] = row
         kept += 1
-    return kept == total - 1
+    return total - kept
 
 
 @njit(cache=True)
@@ -211,8 +205,7 @@ def rooted(
     chosen: NDArray[np.int32],
     label: NDArray[np.int32],
     total: int,
-    sides: NDArray[np.int32],
-    faces: NDArray[np.int32],
+    hinges: HingeTables,
     body: NDArray[np.int32],
     parent: NDArray[np.int32],
     axis: NDArray[np.int8],
@@ -262,10 +255,11 @@ def rooted(
             h = tail - 1
             tail += 1
             parent[h] = index[here]
-            d = faces[found[r, 4]]
-            n = faces[sides[found[r, 4], found[r, 5] - 1]]
+            side = hinges.sides[found[r, 4], found[r, 5] - 1]
+            d = hinges.faces[found[r, 4]]
+            n = hinges.faces[side]
             d_axis = found[r, 4] >> 1
-            n_axis = sides[found[r, 4], found[r, 5] - 1] >> 1
+            n_axis = side >> 1
             axis[h] = 3 - d_axis - n_axis
             # Component of d x n along the positive axis; seen from v the same edge turns back.
             sign = d[d_axis] * n[n_axis]
@@ -277,4 +271,20 @@ def rooted(
         body[v] = index[label[v]]
 
 
-FACE_ARRAY: NDArray[np.int32] = np.ascontiguousarray(FACES)
+@njit(cache=True)
+def loose_pieces(
+    found: NDArray[np.int32],
+    rows: int,
+    total: int,
+    tries: int,
+    generator: NDArray[np.uint64],
+) -> int:
+    """Fewest pieces that a few random choices of hinges leave, less one."""
+    wanted = np.zeros(rows)
+    chosen = np.empty(total, np.int32)
+    least = total
+    for _ in range(tries):
+        least = min(least, spanning_tree(found, rows, total, wanted, generator, chosen))
+        if least == 1:
+            break
+    return least - 1

@@ -1,5 +1,7 @@
 """Large-neighbourhood search: take some voxels out and put them back with the beam."""
 
+# mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
+
 from __future__ import annotations
 
 import numpy as np
@@ -8,8 +10,9 @@ from numpy.typing import NDArray
 
 from fabfold.tree.grow import clusters, energy_of, fill_beam
 from fabfold.tree.problem import Tables
-from fabfold.tree.rebuild import connected
+from fabfold.tree.rebuild import candidates, connected, loose_pieces
 from fabfold.tree.rng import random_below, random_float
+from fabfold.tree.wedge import HingeTables
 
 __all__ = ["propose", "ruin"]
 
@@ -115,6 +118,8 @@ def propose(
     tables: Tables,
     pose: NDArray[np.int32],
     empty_face: float,
+    hinges: HingeTables,
+    loose: float,
     threshold: float,
     tries: int,
     least: int,
@@ -133,6 +138,9 @@ def propose(
         Full set of poses to start from.
     empty_face : float
         Weighted energy of one boundary face of an empty template cell.
+    hinges : HingeTables
+    loose : float
+        Penalty for each piece, after the first, into which hinges that can turn leave the whole.
     threshold : float
     tries : int
         Most removals tried.
@@ -149,7 +157,7 @@ def propose(
     used : int
         Removals tried; 0 is never returned.
     energy : float
-        Of `out`; infinite when nothing was found.
+        Of `out`, with the penalty; infinite when nothing was found.
     found : int
         Rigid clusters of `out`.
     """
@@ -160,6 +168,8 @@ def propose(
     for v in range(count):
         holder[pose[v] // 24] = v
     gone = np.empty(count, np.bool_)
+    hinge = np.empty((3 * count, 12), np.int32)
+    new_label = np.empty(count, np.int32)
     results = np.empty((width, count), np.int32)
     start = np.empty(count, np.int32)
     for attempt in range(tries):
@@ -175,9 +185,7 @@ def propose(
                 start[v] = -1
                 todo[k] = v
                 k += 1
-        rows, _ = fill_beam(
-            tables, start, todo, width, noise, joint_share, generator, results
-        )
+        rows, _ = fill_beam(tables, start, todo, width, noise, joint_share, generator, results)
         best = np.inf
         best_row = -1
         best_found = 0
@@ -190,7 +198,11 @@ def propose(
             if same:
                 continue
             energy, found = energy_of(tables, results[r], empty_face)
-            if energy <= threshold and energy < best and connected(tables, results[r]):
+            if energy > threshold or energy >= best or not connected(tables, results[r]):
+                continue
+            total, rows_found = candidates(tables, results[r], hinges, new_label, hinge)
+            energy += loose * loose_pieces(hinge, rows_found, total, 4, generator)
+            if energy <= threshold and energy < best:
                 best = energy
                 best_row = r
                 best_found = found

@@ -4,21 +4,25 @@ Two bodies that a hinge joins directly move against each other in one way only, 
 useless when the child's half turn would run through its parent, whatever else moves.
 """
 
+# mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
+
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabfold.lattice import FACES
 from fabfold.tree.catalogue import edge_sides
 
-__all__ = ["REACH", "blocked", "half_turn_table", "side_table"]
+__all__ = ["REACH", "HingeTables", "blocked", "half_turn_table", "hinge_tables"]
 
 #: Cells up to this far from the axis are tested; what lies beyond is left to the planner.
 REACH = 12
-#: Half the side of the turning cubes: a little less than 1/2, since the bodies stand apart by a gap.
+#: Half the side of the turning cubes: a little under 1/2, since bodies stand apart by a gap.
 HALF_SIDE = 0.49
 
 
@@ -69,10 +73,29 @@ def half_turn_table() -> NDArray[np.bool_]:
     return np.ascontiguousarray(quarter | following)
 
 
+class HingeTables(NamedTuple):
+    """What kernels must know of single hinges.
+
+    Attributes
+    ----------
+    faces : (6, 3) int32 array
+        ``FACES``.
+    sides : (6, 4) int32 array
+        ``FACES`` index of each edge of each face.
+    swept : bool array
+        :func:`half_turn_table`.
+    """
+
+    faces: NDArray[np.int32]
+    sides: NDArray[np.int32]
+    swept: NDArray[np.bool_]
+
+
 @cache
-def side_table() -> NDArray[np.int32]:
-    """``FACES`` index of each edge of each face, shape (6, 4) int32."""
-    return np.array([edge_sides(face) for face in range(6)], dtype=np.int32)
+def hinge_tables() -> HingeTables:
+    """The tables of half-turn hinges."""
+    sides = np.array([edge_sides(face) for face in range(6)], dtype=np.int32)
+    return HingeTables(np.ascontiguousarray(FACES), sides, half_turn_table())
 
 
 @njit(cache=True)

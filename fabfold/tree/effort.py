@@ -1,0 +1,65 @@
+"""How long the tree search may try, in counts and never in seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["EFFORTS", "Effort"]
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Budget and settings of one run of the tree search.
+
+    Attributes
+    ----------
+    beam : int
+        States kept while growing.
+    roots : int
+        Root poses tried before growing is given up.
+    restarts : int
+        Fresh starts of the folding phase; the search goes on to the next while none folds.
+    removals : int
+        Large-neighbourhood moves, per start, that improve the energy before folding is looked at.
+    folding : int
+        Candidates judged per start until one folds (phase A).
+    polishing : int
+        Candidates judged after that to lower the energy (phase B).
+    least, most : int
+        Voxels taken out at a time.
+    rebeam : int
+        States kept while they are put back.
+    trees : int
+        Spanning trees tried for each set of poses.
+    glance : int
+        Planner expansions without progress for a first score.
+    look : int
+        The same, where the first score leaves little to do.
+    near : float
+        Share of unresolved planner levels that still counts as little.
+    keep : int
+        Most candidates returned.
+    """
+
+    beam: int = 30
+    roots: int = 400
+    restarts: int = 6
+    removals: int = 0
+    folding: int = 2500
+    polishing: int = 2500
+    least: int = 4
+    most: int = 16
+    rebeam: int = 6
+    trees: int = 3
+    glance: int = 40
+    look: int = 2500
+    near: float = 0.06
+    keep: int = 5
+
+
+#: Effort by name, as the command line offers it.
+EFFORTS: dict[str, Effort] = {
+    "quick": Effort(restarts=4, folding=1500, polishing=500),
+    "normal": Effort(),
+    "thorough": Effort(restarts=12, folding=6000, polishing=10000),
+}

@@ -1,0 +1,379 @@
+"""Find joint trees that fold (paper section 4, with folding inside the search)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.errors import NoFoldError, NoTreeError
+from fabfold.lattice import parity
+from fabfold.tree.build import HingeChoice, SpanningTree, fold_tree, hinge_choice
+from fabfold.tree.effort import Effort
+from fabfold.tree.foldability import Foldability
+from fabfold.tree.grow import energy_of, fill_beam
+from fabfold.tree.model import FoldTree
+from fabfold.tree.problem import TreeProblem
+from fabfold.tree.rebuild import loose_pieces
+from fabfold.tree.rng import generator
+from fabfold.tree.ruin import propose
+from fabfold.tree.wedge import hinge_tables
+
+__all__ = ["Candidate", "Statistics", "grow", "solve"]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A tree that folds.
+
+    Attributes
+    ----------
+    tree : FoldTree
+    path : (m, 2) int32 array
+        One row a move, A to B: hinge index and signed quarter turns about its positive axis.
+    seed : int
+        Seed of the run that found it.
+    """
+
+    tree: FoldTree
+    path: NDArray[np.int32]
+    seed: int
+
+    @property
+    def energy(self) -> dict[str, float]:
+        """The tree's energies: ``surface``, ``count`` and ``total``."""
+        return self.tree.energy
+
+
+@dataclass
+class Statistics:
+    """What one run did, in counts."""
+
+    grown: int = 0
+    removals: int = 0
+    judged: int = 0
+    trees: int = 0
+    closed: int = 0
+    glances: int = 0
+    looks: int = 0
+    starts: int = 0
+    folded: int = 0
+    log: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _State:
+    """Full poses, their hinges, and what the objective says of them."""
+
+    pose: NDArray[np.int32]
+    energy: float
+    tree: SpanningTree | None
+    penalty: float
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """Weights of the folding phase, which depend on the size of the problem."""
+
+    stuck: float
+    cost: float
+    hot: float
+    cold: float
+
+
+def _scale(voxels: int) -> _Scale:
+    # A hinge that cannot move must cost about as much as the energy a few joints bring; large
+    # problems need the penalty to rule, or the energy freezes before anything folds.
+    if voxels <= 72:
+        return _Scale(stuck=0.15, cost=1.0, hot=0.15, cold=0.02)
+    return _Scale(stuck=1.0, cost=0.2, hot=0.1, cold=0.01)
+
+
+def grow(
+    problem: TreeProblem, seed: int, *, beam: int = 30, roots: int = 400
+) -> Iterator[NDArray[np.int32]]:
+    """Full sets of poses grown from random root poses, best of each root.
+
+    Parameters
+    ----------
+    problem : TreeProblem
+    seed : int
+    beam : int
+        States kept.
+    roots : int
+        Root poses tried.
+
+    Yields
+    ------
+    (n,) int32 array
+        ``24 * template cell + rotation`` of each voxel.
+
+    Raises
+    ------
+    NoTreeError
+        If the checkerboard colours rule every tree out.
+    """
+    colourings = problem.colourings()
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
+    state = generator(int(rng.integers(2**62)))
+    colour = parity(problem.source)
+    cells = [np.flatnonzero(parity(problem.template.cells) == c) for c in (0, 1)]
+    count = len(problem)
+    out = np.empty((beam, count), np.int32)
+    for _ in range(roots):
+        root = int(rng.integers(count))
+        wanted = cells[(colour[root] + colourings[int(rng.integers(len(colourings)))]) % 2]
+        start = np.full(count, -1, np.int32)
+        start[root] = 24 * wanted[rng.integers(len(wanted))] + rng.integers(24)
+        todo = np.flatnonzero(start < 0).astype(np.int32)
+        if len(todo) == 0:
+            yield start
+            continue
+        found, _ = fill_beam(problem.tables, start, todo, beam, 0.1, 1.0, state, out)
+        if found:
+            yield out[0].copy()
+
+
+class _Search:
+    """One run; holds the random state and the best results."""
+
+    def __init__(
+        self,
+        problem: TreeProblem,
+        seed: int,
+        foldability: Foldability,
+        effort: Effort,
+        statistics: Statistics,
+    ) -> None:
+        self.problem = problem
+        self.seed = seed
+        self.judge = foldability
+        self.effort = effort
+        self.statistics = statistics
+        self.rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
+        self.generator = generator(int(self.rng.integers(2**62)))
+        self.scale = _scale(len(problem))
+        self.results: list[_State] = []
+
+    # --- moves -----------------------------------------------------------------------------
+
+    def neighbour(
+        self, pose: NDArray[np.int32], threshold: float, tries: int, loose: float
+    ) -> tuple[NDArray[np.int32], float] | None:
+        """Other poses with energy (and penalty for loose pieces) of at most `threshold`."""
+        effort = self.effort
+        out = np.empty(len(pose), np.int32)
+        used, energy, _ = propose(
+            self.problem.tables, pose, self.problem.empty_face, hinge_tables(), loose, threshold,
+            tries, effort.least, min(effort.most, len(pose)), effort.rebeam, 0.05, 1.0,
+            self.generator, out,
+        )  # fmt: skip
+        self.statistics.removals += used
+        return None if math.isinf(energy) else (out, energy)
+
+    def hang_together(self, pose: NDArray[np.int32]) -> _State | None:
+        """Improve grown poses until hinges that can turn join all the clusters."""
+
+        def loose_of(poses: NDArray[np.int32]) -> int:
+            choice = hinge_choice(self.problem, poses)
+            found, total = choice.found, choice.clusters
+            return int(loose_pieces(found, len(found), total, 8, self.generator))
+
+        loose = 0.5
+        energy, _ = energy_of(self.problem.tables, pose, self.problem.empty_face)
+        value = energy + loose * loose_of(pose)
+        for _ in range(40):
+            left = loose_of(pose)
+            if left == 0:
+                return _State(pose, value, None, 0.0)
+            found = self.neighbour(pose, value + 0.05, 200, loose)
+            if found:
+                pose, value = found
+        return None
+
+    def trees(
+        self, choice: HingeChoice, keys: set[tuple[int, int]], count: int
+    ) -> Iterator[SpanningTree]:
+        """Random spanning trees; the first ones keep most of the hinges in `keys`."""
+        for k in range(count):
+            bonus = (2.0, 0.7, 0.0)[min(k, 2)] if keys else 0.0
+            tree = choice.tree(choice.wanted(keys, bonus), self.generator)
+            if tree is not None:
+                self.statistics.trees += 1
+                yield tree
+
+    # --- judging ---------------------------------------------------------------------------
+
+    def unresolved(self, tree: SpanningTree) -> float:
+        """Share of planner levels unresolved, with a long look where little is missing."""
+        self.statistics.glances += 1
+        share = self.judge.unresolved(tree.system, self.effort.glance)
+        if 0.0 < share <= self.effort.near:
+            self.statistics.looks += 1
+            share = self.judge.unresolved(tree.system, self.effort.look)
+        return share
+
+    def judged(
+        self, pose: NDArray[np.int32], energy: float, keys: set[tuple[int, int]], bound: float
+    ) -> _State | None:
+        """The best spanning tree for these poses, or None where its penalty exceeds `bound`."""
+        choice = hinge_choice(self.problem, pose)
+        self.statistics.judged += 1
+        best: SpanningTree | None = None
+        least = math.inf
+        for tree in self.trees(choice, keys, self.effort.trees):
+            from_a, from_b = self.judge.stuck(tree.system)
+            penalty = self.scale.stuck * (from_a + from_b)
+            if penalty == 0:
+                self.statistics.closed += 1
+                penalty = self.scale.stuck * self.unresolved(tree)
+            if penalty < least:
+                best, least = tree, penalty
+            if least == 0:
+                break
+        if best is None or least > bound:
+            return None
+        return _State(pose, energy, best, least)
+
+    # --- phases ----------------------------------------------------------------------------
+
+    def fold(self, start: _State) -> _State | None:
+        """Phase A: trade energy for foldability until a tree folds."""
+        scale = self.scale
+        now = self.judged(start.pose, start.energy, set(), math.inf)
+        if now is None:
+            return None
+        steps = self.effort.folding
+        for step in range(steps):
+            if now.penalty == 0:
+                return now
+            heat = scale.hot * (scale.cold / scale.hot) ** (step / steps)
+            slack = heat * self.rng.exponential()
+            value = scale.cost * now.energy + now.penalty + slack
+            assert now.tree is not None
+            if self.rng.random() < 0.25:
+                pose, energy = now.pose, now.energy
+            else:
+                found = self.neighbour(now.pose, value / scale.cost, 20, 10.0)
+                if found is None:
+                    continue
+                pose, energy = found
+            fresh = self.judged(pose, energy, now.tree.keys, value - scale.cost * energy)
+            if fresh is not None:
+                now = fresh
+        return now if now.penalty == 0 else None
+
+    def polish(self, start: _State) -> None:
+        """Phase B: anneal the energy among trees that the planner folds."""
+        scale = self.scale
+        now = start
+        self.results.append(now)
+        best = now.energy
+        steps = self.effort.polishing
+        for step in range(steps):
+            heat = 0.1 * (0.005 / 0.1) ** (step / steps)
+            value = now.energy + heat * self.rng.exponential()
+            found = self.neighbour(now.pose, value, 20, 10.0)
+            if found is None:
+                continue
+            assert now.tree is not None
+            fresh = self.judged(*found, now.tree.keys, 0.0)
+            if fresh is None:
+                continue
+            now = fresh
+            self.statistics.folded += 1
+            if now.energy < best + 0.1:
+                best = min(best, now.energy)
+                self.results.append(now)
+        del scale
+
+    def run(self) -> list[Candidate]:
+        """All the phases."""
+        effort = self.effort
+        grown = grow(self.problem, self.seed, beam=effort.beam, roots=effort.roots)
+        for pose in grown:
+            self.statistics.grown += 1
+            start = self.hang_together(pose)
+            if start is None:
+                continue
+            self.statistics.starts += 1
+            folded = self.fold(start)
+            if folded is not None:
+                self.polish(folded)
+                break
+            if self.statistics.starts >= effort.restarts:
+                break
+        if self.statistics.grown == 0:
+            raise NoTreeError(
+                f"no tree found for {len(self.problem)} voxels in template "
+                f"{self.problem.template.name!r} from {effort.roots} root poses (seed "
+                f"{self.seed}): try other seeds, another voxelization or a larger template"
+            )
+        candidates = self.finished()
+        if not candidates:
+            raise NoFoldError(
+                f"trees fit template {self.problem.template.name!r}, but none of "
+                f"{self.statistics.judged} could be folded (seed {self.seed}): try other seeds, "
+                "more effort or another voxelization"
+            )
+        return candidates
+
+    def finished(self) -> list[Candidate]:
+        """The best results that differ in at least two hinges, with their paths."""
+        chosen: list[_State] = []
+        out: list[Candidate] = []
+        for state in sorted(self.results, key=lambda s: s.energy):
+            assert state.tree is not None
+            if any(len(state.tree.keys ^ other.tree.keys) < 4 for other in chosen if other.tree):
+                continue
+            path = self.judge.path(state.tree.system)
+            if path is None:
+                continue
+            chosen.append(state)
+            tree = fold_tree(self.problem, state.pose, state.tree)
+            out.append(Candidate(tree, path, self.seed))
+            if len(out) == self.effort.keep:
+                break
+        return out
+
+
+def solve(
+    problem: TreeProblem,
+    seed: int,
+    foldability: Foldability,
+    effort: Effort | None = None,
+    statistics: Statistics | None = None,
+) -> list[Candidate]:
+    """Trees of rigid joints and half-turn hinges that fold, best first.
+
+    Deterministic for the same problem, seed and effort. Phase A lowers the energy plus a penalty
+    for hinges that cannot move and for what the planner leaves unresolved, until a tree folds;
+    phase B anneals the energy among trees that fold.
+
+    Parameters
+    ----------
+    problem : TreeProblem
+    seed : int
+        Not negative.
+    foldability : Foldability
+    effort : Effort, optional
+    statistics : Statistics, optional
+        Counts what was done.
+
+    Returns
+    -------
+    list of Candidate
+        One or more, by ascending energy.
+
+    Raises
+    ------
+    NoTreeError
+        If the colours rule every tree out, or none was found.
+    NoFoldError
+        If trees were found but none folds.
+    """
+    search = _Search(problem, seed, foldability, effort or Effort(), statistics or Statistics())
+    return search.run()
