@@ -1,0 +1,366 @@
+"""Triangles of one body, gathered into the faces that a CAD program would draw.
+
+Flat faces first: triangles that lie in one plane become one region. Then the round faces of the
+hinges: the strips that a mesh has for a cylinder or cone about a hinge's axis become one region on
+the true surface, where all of its rim allows it: a rim must run straight along the surface, or
+around it in a plane square to the axis beside a flat face or another surface of the same hinge.
+Strips with any other rim, such as where a barrel meets a sculpted surface, stay flat.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FLAT_MM", "Axis", "Plane", "Round", "Surface", "flat_regions", "round_regions"]
+
+#: Corners this near to a plane lie in it, mm.
+FLAT_MM = 1e-3
+#: Corners this near to a cylinder or cone lie on it, mm.
+ROUND_MM = 2e-3
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A hinge's axis as a bounded line.
+
+    Attributes
+    ----------
+    point : (3,) tuple of float
+        Middle of the hinge, mm.
+    direction : int
+        0, 1 or 2: along +x, +y or +z.
+    half_length, radius : float
+        Of the cylinder that holds all that is round about the axis, mm.
+    """
+
+    point: tuple[float, float, float]
+    direction: int
+    half_length: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A flat face; `normal` points out of the body."""
+
+    point: tuple[float, float, float]
+    normal: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Round:
+    """A face on a cylinder (`slope` 0) or a cone about `axis`.
+
+    Attributes
+    ----------
+    axis : Axis
+    radius : float
+        Where the surface crosses the plane through the axis' point, mm; may be negative on a cone.
+    slope : float
+        Growth of the radius along the axis.
+    outward : bool
+        Whether the body is inside, so that its outward normal points away from the axis.
+    """
+
+    axis: Axis
+    radius: float
+    slope: float
+    outward: bool
+
+
+Surface = Plane | Round
+
+
+def _neighbours(faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Triangle across each of a triangle's three edges, shape (f, 3); the mesh is closed."""
+    count = int(faces.max()) + 1
+    start = faces.reshape(-1).astype(np.int64)
+    end = np.roll(faces, -1, axis=1).reshape(-1).astype(np.int64)
+    backward = end * count + start
+    order = np.argsort(backward, kind="stable")
+    across = order[np.searchsorted(backward[order], start * count + end)]
+    return (across // 3).reshape(-1, 3).astype(np.int32)
+
+
+def flat_regions(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], list[Plane]]:
+    """Give each triangle of a closed mesh the flat region it belongs to.
+
+    Regions grow from the largest triangle left over neighbours whose corners all lie in its plane.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+    faces : (f, 3) int32 array
+
+    Returns
+    -------
+    labels : (f,) int32 array
+        Index into `planes`.
+    planes : list of Plane
+    """
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    doubled = np.linalg.norm(normals, axis=1)
+    normals = np.divide(
+        normals, doubled[:, None], out=np.zeros_like(normals), where=doubled[:, None] > 0
+    )
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    sliver = doubled < FLAT_MM * longest
+    beside = _neighbours(faces).tolist()
+    labels = np.full(len(faces), -1, dtype=np.int32)
+    planes: list[Plane] = []
+    for seed in np.argsort(-np.round(doubled, 9), kind="stable").tolist():
+        if labels[seed] >= 0:
+            continue
+        label = len(planes)
+        point, normal = corners[seed, 0], normals[seed]
+        labels[seed] = label
+        queue = deque([seed])
+        while queue:
+            for other in beside[queue.popleft()]:
+                if labels[other] >= 0:
+                    continue
+                if not sliver[other] and normals[other] @ normal < 0.9:
+                    continue
+                if np.abs((corners[other] - point) @ normal).max() < FLAT_MM:
+                    labels[other] = label
+                    queue.append(other)
+        planes.append(_plane(corners[labels == label], normal))
+    return labels, planes
+
+
+def _plane(corners: NDArray[np.float64], normal: NDArray[np.float64]) -> Plane:
+    """Plane through the middle of the triangles, along a lattice axis where that is meant."""
+    axis = int(np.abs(normal).argmax())
+    if 1.0 - abs(normal[axis]) < 1e-6:
+        normal = np.where(np.arange(3) == axis, np.sign(normal), 0.0)
+    points = corners.reshape(-1, 3)
+    height = points @ normal
+    point = points[0] + normal * ((height.min() + height.max()) / 2 - height[0])
+    x, y, z = (float(v) for v in point)
+    return Plane((x, y, z), (float(normal[0]), float(normal[1]), float(normal[2])))
+
+
+def _polar(
+    points: NDArray[np.float64], axis: Axis
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Radius, angle and height of points about an axis."""
+    along = axis.direction
+    first, second = (along + 1) % 3, (along + 2) % 3
+    offset = points - np.asarray(axis.point)
+    x, y = offset[..., first], offset[..., second]
+    return np.hypot(x, y), np.arctan2(y, x), offset[..., along]
+
+
+def _strip(
+    points: NDArray[np.float64], normal: NDArray[np.float64], axis: Axis
+) -> tuple[float, float, bool] | None:
+    """Radius at the axis' point, slope and side of the surface that a flat strip stands for."""
+    radius, angle, height = _polar(points, axis)
+    if radius.max() > axis.radius or np.abs(height).max() > axis.half_length:
+        return None
+    if radius.max() < 10 * ROUND_MM or np.ptp(height) < 10 * ROUND_MM:
+        return None
+    far = radius > 10 * ROUND_MM
+    turn = np.angle(np.exp(1j * (angle[far] - angle[far][0])))
+    if np.ptp(turn) > np.radians(31.0) or np.ptp(turn) < 1e-3:
+        return None
+    if np.ptp(radius) < ROUND_MM:
+        fit = (float((radius.min() + radius.max()) / 2), 0.0)
+    else:
+        slope, at_zero = np.polyfit(height, radius, 1)
+        fit = (float(at_zero), float(slope))
+        if np.abs(radius - (fit[0] + fit[1] * height)).max() > ROUND_MM or abs(slope) > 20:
+            return None
+    along = axis.direction
+    middle = float(turn.min() + turn.max()) / 2 + float(angle[far][0])
+    away = np.cos(middle) * normal[(along + 1) % 3] + np.sin(middle) * normal[(along + 2) % 3]
+    steep = 1.0 / np.hypot(1.0, fit[1])
+    if abs(abs(away) - steep) > 0.02:
+        return None
+    return fit[0], fit[1], bool(away > 0)
+
+
+def round_regions(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    labels: NDArray[np.int32],
+    planes: Sequence[Plane],
+    axes: Sequence[Axis],
+) -> tuple[NDArray[np.int32], list[Surface]]:
+    """Join the strips about hinge axes into cylinders and cones.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+    faces : (f, 3) int32 array
+    labels : (f,) int32 array
+    planes : sequence of Plane
+        Both from :func:`flat_regions`.
+    axes : sequence of Axis
+
+    Returns
+    -------
+    labels : (f,) int32 array
+        Index into `surfaces`. A round region spans less than half a turn or so.
+    surfaces : list of Plane or Round
+    """
+    rims = _rims(faces, labels)
+    strips: dict[int, tuple[int, float, float, bool]] = {}
+    corners_of = _corners_by_region(faces, labels, len(planes))
+    for index, axis in enumerate(axes):
+        near = _regions_near(vertices, faces, labels, axis)
+        for region in near:
+            if region in strips:
+                continue
+            found = _strip(vertices[corners_of[region]], np.asarray(planes[region].normal), axis)
+            if found is not None:
+                strips[region] = (index, *found)
+    _drop_unfit(vertices, planes, axes, rims, strips)
+    return _joined(vertices, labels, planes, axes, rims, strips, corners_of)
+
+
+Rims = dict[tuple[int, int], list[tuple[int, int]]]
+
+
+def _rims(faces: NDArray[np.int32], labels: NDArray[np.int32]) -> Rims:
+    """Mesh edges between each ordered pair of regions, as the first region runs along them."""
+    beside = _neighbours(faces)
+    rims: Rims = {}
+    for face, edge in np.argwhere(labels[beside] != labels[:, None]).tolist():
+        pair = (int(labels[face]), int(labels[beside[face, edge]]))
+        ends = (int(faces[face, edge]), int(faces[face, (edge + 1) % 3]))
+        rims.setdefault(pair, []).append(ends)
+    return rims
+
+
+def _corners_by_region(
+    faces: NDArray[np.int32], labels: NDArray[np.int32], count: int
+) -> list[NDArray[np.int32]]:
+    order = np.argsort(labels, kind="stable")
+    parts = np.split(faces[order], np.searchsorted(labels[order], np.arange(1, count)))
+    return [np.unique(part) for part in parts]
+
+
+def _regions_near(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], labels: NDArray[np.int32], axis: Axis
+) -> list[int]:
+    radius, _, height = _polar(vertices, axis)
+    inside = (radius <= axis.radius) & (np.abs(height) <= axis.half_length)
+    return [int(label) for label in np.unique(labels[inside[faces].all(axis=1)])]
+
+
+def _square(plane: Plane, axis: Axis) -> bool:
+    return abs(abs(plane.normal[axis.direction]) - 1.0) < 1e-6
+
+
+def _same(one: tuple[int, float, float, bool], other: tuple[int, float, float, bool]) -> bool:
+    return (
+        one[0] == other[0]
+        and one[3] == other[3]
+        and abs(one[1] - other[1]) < 2 * ROUND_MM
+        and abs(one[2] - other[2]) < 5e-3
+    )
+
+
+def _drop_unfit(
+    vertices: NDArray[np.float64],
+    planes: Sequence[Plane],
+    axes: Sequence[Axis],
+    rims: Rims,
+    strips: dict[int, tuple[int, float, float, bool]],
+) -> None:
+    """Take out strips whose rim cannot follow the round surface, until none is left to take."""
+    beside: dict[int, list[int]] = {}
+    for one, other in rims:
+        beside.setdefault(one, []).append(other)
+
+    def fits(region: int) -> bool:
+        index, _, slope, _ = strips[region]
+        axis = axes[index]
+        for other in beside[region]:
+            joined = other in strips and _same(strips[region], strips[other])
+            for start, end in rims[region, other]:
+                ends = vertices[[start, end]]
+                radius, angle, height = _polar(ends, axis)
+                turn = abs(np.angle(np.exp(1j * (angle[1] - angle[0]))))
+                if min(radius) * turn < ROUND_MM or (slope != 0.0 and min(radius) < ROUND_MM):
+                    continue  # runs straight along the surface
+                if joined:
+                    return False  # a slanted cut between two strips of one surface
+                if abs(height[1] - height[0]) > ROUND_MM:
+                    return False
+                flat = other not in strips and _square(planes[other], axis)
+                turned = other in strips and strips[other][0] == index
+                if not (flat or turned):
+                    return False
+        return True
+
+    queue = deque(sorted(strips))
+    while queue:
+        region = queue.popleft()
+        if region in strips and not fits(region):
+            del strips[region]
+            queue.extend(other for other in sorted(beside[region]) if other in strips)
+
+
+def _joined(
+    vertices: NDArray[np.float64],
+    labels: NDArray[np.int32],
+    planes: Sequence[Plane],
+    axes: Sequence[Axis],
+    rims: Rims,
+    strips: dict[int, tuple[int, float, float, bool]],
+    corners_of: list[NDArray[np.int32]],
+) -> tuple[NDArray[np.int32], list[Surface]]:
+    """Flood strips of one surface together, keeping each face to less than a full turn."""
+    beside: dict[int, list[int]] = {}
+    for one, other in rims:
+        beside.setdefault(one, []).append(other)
+
+    def sector(region: int) -> int:
+        # Faces are cut along two fixed half-planes, so that none closes on itself.
+        _, angle, _ = _polar(vertices[corners_of[region]].mean(axis=0), axes[strips[region][0]])
+        return int(angle > 0.0)
+
+    group: dict[int, int] = {}
+    members: list[list[int]] = []
+    for seed in sorted(strips):
+        if seed in group:
+            continue
+        group[seed] = len(members)
+        found = [seed]
+        queue = deque([seed])
+        while queue:
+            here = queue.popleft()
+            for other in sorted(beside[here]):
+                if (
+                    other in strips
+                    and other not in group
+                    and _same(strips[seed], strips[other])
+                    and sector(other) == sector(seed)
+                ):
+                    group[other] = group[seed]
+                    found.append(other)
+                    queue.append(other)
+        members.append(found)
+    surfaces: list[Surface] = []
+    renamed = np.empty(len(planes), dtype=np.int32)
+    for region, plane in enumerate(planes):
+        if region not in group:
+            renamed[region] = len(surfaces)
+            surfaces.append(plane)
+    for found in members:
+        values = np.array([strips[region][1:3] for region in found])
+        index, _, _, outward = strips[found[0]]
+        renamed[found] = len(surfaces)
+        radius, slope = values.mean(axis=0)
+        surfaces.append(Round(axes[index], float(radius), float(slope), outward))
+    return renamed[labels], surfaces

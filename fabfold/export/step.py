@@ -1,0 +1,192 @@
+"""STEP: the bodies as named solids in shape A, with true cylinders and cones at the hinges.
+
+A body's mesh is turned into faces (see :mod:`fabfold.export.regions`), written as STEP text, read
+back with the CAD kernel, and compared with the mesh. A body whose solid is not valid, or differs
+from its mesh, is written again with flat faces only, and then triangle by triangle.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.errors import GeometryError
+from fabfold.export.brep import Brep, brep_of
+from fabfold.export.colours import body_colours, palette
+from fabfold.export.regions import Axis, Plane, Surface, flat_regions, round_regions
+from fabfold.export.steptext import StepSolid, step_text
+from fabfold.export.weld import weld
+from fabfold.files import write_text
+from fabfold.joinery.model import BodyMesh, Joinery
+from fabfold.meshes import mesh_volume
+from fabfold.progress import Progress, SilentProgress
+from fabfold.tree.model import FoldTree
+
+__all__ = ["StepFacts", "write_step"]
+
+#: A solid's volume may differ from its mesh's by this share before it is written again.
+VOLUME_SHARE = 0.01
+_LEVELS = ("round", "flat", "triangles")
+
+
+@dataclass(frozen=True)
+class StepFacts:
+    """What :func:`write_step` wrote.
+
+    Attributes
+    ----------
+    solids : int
+    faces : int
+        Of all solids.
+    round_faces : int
+        Of these on true cylinders and cones.
+    plain : tuple of str
+        Bodies that could not be written with round faces.
+    volume_mm3 : float
+        Of all solids, as the CAD kernel measures it.
+    """
+
+    solids: int
+    faces: int
+    round_faces: int
+    plain: tuple[str, ...]
+    volume_mm3: float
+
+
+def hinge_axes(joinery: Joinery, tree: FoldTree) -> list[list[Axis]]:
+    """Axes of the hinges at each body, in mm."""
+    origin = np.asarray(joinery.origin_mm, dtype=float)
+    reach = 1.5 * (joinery.barrel_radius_mm + joinery.clearance_mm)
+    found: list[list[Axis]] = [[] for _ in tree.bodies]
+    for hinge in tree.hinges:
+        x, y, z = (origin + joinery.voxel_mm * np.asarray(hinge.point)).tolist()
+        along = int(np.abs(hinge.direction).argmax())
+        axis = Axis((x, y, z), along, 0.5 * joinery.voxel_mm, reach)
+        found[hinge.parent].append(axis)
+        found[hinge.child].append(axis)
+    return found
+
+
+def write_step(
+    path: Path,
+    joinery: Joinery,
+    tree: FoldTree | None = None,
+    *,
+    title: str | None = None,
+    colours: NDArray[np.uint8] | None = None,
+    progress: Progress | None = None,
+) -> StepFacts:
+    """Write the bodies as solids, in mm, shape A; the same input gives the same bytes.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.step``.
+    joinery : Joinery
+    tree : FoldTree, optional
+        Tells where the hinges are; without it every face is flat.
+    title : str, optional
+        Name of the assembly; the file's stem by default.
+    colours : (b, 3) uint8 array, optional
+        sRGB, one a body.
+    progress : Progress, optional
+
+    Returns
+    -------
+    StepFacts
+
+    Raises
+    ------
+    GeometryError
+        If the CAD kernel finds no valid solid for a body, even from plain triangles.
+    """
+    from fabfold import __version__
+
+    told = progress or SilentProgress()
+    if colours is None:
+        colours = palette(len(joinery.bodies)) if tree is None else body_colours(tree)
+    axes = hinge_axes(joinery, tree) if tree is not None else [[] for _ in joinery.bodies]
+    application = f"fabfold {__version__}"
+    solids, plain, volume = [], [], 0.0
+    for index, body in enumerate(joinery.bodies):
+        told.update(index / len(joinery.bodies), body.name)
+        red, green, blue = (int(value) for value in colours[index])
+        brep, level, measured = _sound_brep(body, axes[index], application)
+        solids.append(StepSolid(body.name, brep, (red, green, blue)))
+        volume += measured
+        if level != _LEVELS[0]:
+            plain.append(body.name)
+    write_text(path, step_text(solids, title or path.stem, application))
+    told.update(1.0, f"{len(solids)} solids")
+    faces = [face for solid in solids for face in solid.brep.faces]
+    return StepFacts(
+        solids=len(solids),
+        faces=len(faces),
+        round_faces=sum(not isinstance(face.surface, Plane) for face in faces),
+        plain=tuple(plain),
+        volume_mm3=volume,
+    )
+
+
+def _sound_brep(body: BodyMesh, axes: list[Axis], application: str) -> tuple[Brep, str, float]:
+    """The best faces whose solid is valid and has the mesh's volume."""
+    wanted = mesh_volume(body.vertices, body.faces)
+    faults = []
+    for level in _LEVELS:
+        try:
+            brep = _brep(body, axes, level)
+            valid, volume = _measured(
+                step_text([StepSolid(body.name, brep, (0, 0, 0))], body.name, application)
+            )
+        except (ValueError, IndexError) as error:
+            faults.append(f"{level}: {error}")
+            continue
+        if valid and abs(volume - wanted) <= VOLUME_SHARE * wanted:
+            return brep, level, volume
+        faults.append(f"{level}: {'valid' if valid else 'not valid'}, {volume:.2f} mm³")
+    raise GeometryError(
+        f"{body.name}: no valid STEP solid of its {len(body.faces)} triangles and {wanted:.2f} mm³ "
+        f"({'; '.join(faults)}); the STL and 3MF files are not affected"
+    )
+
+
+def _brep(body: BodyMesh, axes: list[Axis], level: str) -> Brep:
+    vertices, faces = body.vertices, body.faces
+    if level == "triangles":
+        points, faces = weld(vertices, faces)
+        vertices = points.astype(np.float64)
+        labels = np.arange(len(faces), dtype=np.int32)
+        surfaces: list[Surface] = []
+        for corner in vertices[faces]:
+            normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
+            length = np.linalg.norm(normal)
+            normal = normal / length if length > 0 else np.array([0.0, 0.0, 1.0])
+            x, y, z = corner[0].tolist()
+            surfaces.append(
+                Plane((x, y, z), (float(normal[0]), float(normal[1]), float(normal[2])))
+            )
+        return brep_of(vertices, faces, labels, surfaces)
+    labels, planes = flat_regions(vertices, faces)
+    surfaces = list(planes)
+    if level == "round":
+        labels, surfaces = round_regions(vertices, faces, labels, planes, axes)
+    return brep_of(vertices, faces, labels, surfaces)
+
+
+def _measured(text: str) -> tuple[bool, float]:
+    """Whether the CAD kernel reads one valid solid, and its volume in mm³."""
+    from build123d import import_step
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "body.step"
+        path.write_text(text, encoding="ascii")
+        solids = import_step(path).solids()
+    if len(solids) != 1:
+        return False, float(sum(solid.volume for solid in solids))
+    (solid,) = solids
+    valid = solid.is_valid  # a method before build123d 0.11
+    return bool(valid() if callable(valid) else valid), float(solid.volume)

@@ -1,0 +1,278 @@
+"""The text of a STEP file (ISO 10303-21, AP214): named, coloured solids in one assembly.
+
+Written without a CAD kernel: shared vertices and edges stay shared, the header holds no clock and
+no author, and the same solids give the same bytes.
+
+References
+----------
+ISO 10303-42 (geometry and topology), ISO 10303-44 (product structure), ISO 10303-46 (colours).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fabfold.export.brep import Brep, Edge, Face
+from fabfold.export.regions import Axis, Plane
+
+__all__ = ["StepSolid", "step_text"]
+
+#: Points nearer than this count as one; readers take it as the model's precision, mm.
+UNCERTAINTY_MM = 1e-3
+
+
+class StepSolid(NamedTuple):
+    """A named solid and its sRGB colour (bytes)."""
+
+    name: str
+    brep: Brep
+    colour: tuple[int, int, int]
+
+
+class _Writer:
+    """Numbers entities and joins equal ones."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self._known: dict[str, int] = {}
+
+    def add(self, text: str) -> int:
+        self.lines.append(f"#{len(self.lines) + 1}={text};")
+        return len(self.lines)
+
+    def once(self, text: str) -> int:
+        if text not in self._known:
+            self._known[text] = self.add(text)
+        return self._known[text]
+
+    def point(self, xyz: Sequence[float]) -> int:
+        return self.once(f"CARTESIAN_POINT('',{_triple(xyz)})")
+
+    def direction(self, xyz: Sequence[float]) -> int:
+        return self.once(f"DIRECTION('',{_triple(xyz)})")
+
+    def frame(self, point: Sequence[float], z: Sequence[float], x: Sequence[float]) -> int:
+        return self.once(
+            f"AXIS2_PLACEMENT_3D('',#{self.point(point)},#{self.direction(z)},#{self.direction(x)})"
+        )
+
+
+def _real(value: float) -> str:
+    text = f"{value:.9f}".rstrip("0")
+    return "0." if text == "-0." else text
+
+
+def _triple(values: Sequence[float]) -> str:
+    return "(" + ",".join(_real(float(value)) for value in values) + ")"
+
+
+def _string(text: str) -> str:
+    """A quoted string; anything but plain ASCII as ISO 10303-21 wants it."""
+    parts = []
+    for letter in text:
+        if letter in "'\\":
+            parts.append(letter * 2)
+        elif " " <= letter <= "~":
+            parts.append(letter)
+        else:
+            parts.append("\\X4\\" + f"{ord(letter):08X}" + "\\X0\\")
+    return "'" + "".join(parts) + "'"
+
+
+def _refs(numbers: Sequence[int]) -> str:
+    return "(" + ",".join(f"#{number}" for number in numbers) + ")"
+
+
+def _square_to(normal: Sequence[float]) -> tuple[float, float, float]:
+    """Some unit vector square to `normal`, along a lattice axis where that can be."""
+    least = int(np.abs(np.asarray(normal)).argmin())
+    x, y, z = np.cross(normal, np.eye(3)[least])
+    length = math.sqrt(x * x + y * y + z * z)
+    return (x / length, y / length, z / length)
+
+
+def _axes_of(axis: Axis) -> tuple[list[float], list[float]]:
+    """Direction of an axis and the direction from which angles about it count."""
+    unit = np.eye(3)
+    return unit[axis.direction].tolist(), unit[(axis.direction + 1) % 3].tolist()
+
+
+def _edge(writer: _Writer, brep: Brep, edge: Edge, vertex: dict[int, int]) -> int:
+    start, end = brep.vertices[edge.start], brep.vertices[edge.end]
+    if edge.axis is None:
+        along = end - start
+        length = float(np.linalg.norm(along))
+        if not length > 0.0:
+            raise ValueError("an edge of length zero")
+        vector = writer.add(f"VECTOR('',#{writer.direction((along / length).tolist())},1.)")
+        curve = writer.add(f"LINE('',#{writer.point(start.tolist())},#{vector})")
+    else:
+        z, x = _axes_of(edge.axis)
+        centre = np.asarray(edge.axis.point) + edge.height * np.asarray(z)
+        frame = writer.frame(centre.tolist(), z, x)
+        curve = writer.add(f"CIRCLE('',#{frame},{_real(edge.radius)})")
+    return writer.add(f"EDGE_CURVE('',#{vertex[edge.start]},#{vertex[edge.end]},#{curve},.T.)")
+
+
+def _surface(writer: _Writer, brep: Brep, face: Face) -> tuple[int, str]:
+    surface = face.surface
+    if isinstance(surface, Plane):
+        frame = writer.frame(surface.point, surface.normal, _square_to(surface.normal))
+        return writer.add(f"PLANE('',#{frame})"), ".T."
+    z, x = _axes_of(surface.axis)
+    sense = ".T." if surface.outward else ".F."
+    if surface.slope == 0.0:
+        frame = writer.frame(surface.axis.point, z, x)
+        return writer.add(f"CYLINDRICAL_SURFACE('',#{frame},{_real(surface.radius)})"), sense
+    # A cone's frame sits at the wide end of the face, where its radius is not zero.
+    used = [brep.edges[index].start for loop in face.loops for index, _ in loop]
+    used += [brep.edges[index].end for loop in face.loops for index, _ in loop]
+    heights = (brep.vertices[used] - np.asarray(surface.axis.point)) @ np.asarray(z)
+    height = float(heights.max() if surface.slope > 0 else heights.min())
+    centre = np.asarray(surface.axis.point) + height * np.asarray(z)
+    towards = z if surface.slope > 0 else [-value for value in z]
+    frame = writer.frame(centre.tolist(), towards, x)
+    radius = surface.radius + surface.slope * height
+    angle = math.atan(abs(surface.slope))
+    return writer.add(f"CONICAL_SURFACE('',#{frame},{_real(radius)},{_real(angle)})"), sense
+
+
+def _solid(writer: _Writer, name: str, brep: Brep) -> int:
+    vertex: dict[int, int] = {}
+    for edge in brep.edges:
+        for index in (edge.start, edge.end):
+            if index not in vertex:
+                point = writer.point(brep.vertices[index].tolist())
+                vertex[index] = writer.add(f"VERTEX_POINT('',#{point})")
+    edges = [_edge(writer, brep, edge, vertex) for edge in brep.edges]
+    faces = []
+    for face in brep.faces:
+        bounds = []
+        for position, loop in enumerate(face.loops):
+            oriented = [
+                writer.add(f"ORIENTED_EDGE('',*,*,#{edges[index]},{'.T.' if along else '.F.'})")
+                for index, along in loop
+            ]
+            ring = writer.add(f"EDGE_LOOP('',{_refs(oriented)})")
+            kind = "FACE_OUTER_BOUND" if position == 0 else "FACE_BOUND"
+            bounds.append(writer.add(f"{kind}('',#{ring},.T.)"))
+        surface, sense = _surface(writer, brep, face)
+        faces.append(writer.add(f"ADVANCED_FACE('',{_refs(bounds)},#{surface},{sense})"))
+    shell = writer.add(f"CLOSED_SHELL('',{_refs(faces)})")
+    return writer.add(f"MANIFOLD_SOLID_BREP({_string(name)},#{shell})")
+
+
+def _product(writer: _Writer, name: str, contexts: tuple[int, int]) -> tuple[int, int]:
+    """Product definition and its shape."""
+    product_context, definition_context = contexts
+    quoted = _string(name)
+    product = writer.add(f"PRODUCT({quoted},{quoted},'',(#{product_context}))")
+    writer.add(f"PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,(#{product}))")
+    formation = writer.add(f"PRODUCT_DEFINITION_FORMATION('','',#{product})")
+    definition = writer.add(f"PRODUCT_DEFINITION('design','',#{formation},#{definition_context})")
+    return definition, writer.add(f"PRODUCT_DEFINITION_SHAPE('','',#{definition})")
+
+
+def _styled(writer: _Writer, solid: int, colour: tuple[int, int, int]) -> int:
+    red, green, blue = (_real(round(value / 255.0, 6)) for value in colour)
+    paint = writer.once(f"COLOUR_RGB('',{red},{green},{blue})")
+    fill = writer.once(f"FILL_AREA_STYLE_COLOUR('',#{paint})")
+    area = writer.once(f"FILL_AREA_STYLE('',(#{fill}))")
+    style = writer.once(f"SURFACE_STYLE_FILL_AREA(#{area})")
+    side = writer.once(f"SURFACE_SIDE_STYLE('',(#{style}))")
+    usage = writer.once(f"SURFACE_STYLE_USAGE(.BOTH.,#{side})")
+    assignment = writer.once(f"PRESENTATION_STYLE_ASSIGNMENT((#{usage}))")
+    return writer.add(f"STYLED_ITEM('color',(#{assignment}),#{solid})")
+
+
+def step_text(solids: Sequence[StepSolid], title: str, application: str) -> str:
+    """The whole file.
+
+    Parameters
+    ----------
+    solids : sequence of StepSolid
+        Each becomes a part of the assembly `title`, in its place.
+    title : str
+        Name of the assembly.
+    application : str
+        Name and version of the program, for the header.
+
+    Returns
+    -------
+    str
+        ASCII.
+    """
+    writer = _Writer()
+    application_context = writer.add(
+        "APPLICATION_CONTEXT('core data for automotive mechanical design processes')"
+    )
+    writer.add(
+        "APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',2000,"
+        f"#{application_context})"
+    )
+    contexts = (
+        writer.add(f"PRODUCT_CONTEXT('',#{application_context},'mechanical')"),
+        writer.add(
+            f"PRODUCT_DEFINITION_CONTEXT('part definition',#{application_context},'design')"
+        ),
+    )
+    length = writer.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
+    angle = writer.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
+    solid_angle = writer.add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
+    precision = writer.add(
+        f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE({UNCERTAINTY_MM:.1E}),#{length},"
+        "'distance_accuracy_value','largest distance between points that count as one')"
+    )
+    context = writer.add(
+        "(GEOMETRIC_REPRESENTATION_CONTEXT(3)"
+        f"GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#{precision}))"
+        f"GLOBAL_UNIT_ASSIGNED_CONTEXT((#{length},#{angle},#{solid_angle}))"
+        "REPRESENTATION_CONTEXT('mm','3D'))"
+    )
+    here = writer.frame((0, 0, 0), (0, 0, 1), (1, 0, 0))
+    whole, whole_shape = _product(writer, title, contexts)
+    whole_representation = writer.add(
+        f"SHAPE_REPRESENTATION({_string(title)},(#{here}),#{context})"
+    )
+    writer.add(f"SHAPE_DEFINITION_REPRESENTATION(#{whole_shape},#{whole_representation})")
+    styled = []
+    for number, (name, brep, colour) in enumerate(solids, start=1):
+        solid = _solid(writer, name, brep)
+        styled.append(_styled(writer, solid, colour))
+        definition, shape = _product(writer, name, contexts)
+        representation = writer.add(
+            f"ADVANCED_BREP_SHAPE_REPRESENTATION({_string(name)},(#{here},#{solid}),#{context})"
+        )
+        writer.add(f"SHAPE_DEFINITION_REPRESENTATION(#{shape},#{representation})")
+        usage = writer.add(
+            f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{number}',{_string(name)},'',#{whole},"
+            f"#{definition},$)"
+        )
+        placed = writer.add(
+            f"PRODUCT_DEFINITION_SHAPE('Placement','Placement of an item',#{usage})"
+        )
+        stay = writer.add(f"ITEM_DEFINED_TRANSFORMATION('','',#{here},#{here})")
+        relation = writer.add(
+            f"(REPRESENTATION_RELATIONSHIP('','',#{representation},#{whole_representation})"
+            f"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{stay})"
+            "SHAPE_REPRESENTATION_RELATIONSHIP())"
+        )
+        writer.add(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{placed})")
+    writer.add(
+        f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',{_refs(styled)},#{context})"
+    )
+    header = [
+        "ISO-10303-21;",
+        "HEADER;",
+        f"FILE_DESCRIPTION(({_string(title)}),'2;1');",
+        f"FILE_NAME({_string(title)},'1970-01-01T00:00:00',(''),(''),"
+        f"{_string(application)},{_string(application)},'');",
+        "FILE_SCHEMA(('AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }'));",
+        "ENDSEC;",
+        "DATA;",
+    ]
+    return "\n".join([*header, *writer.lines, "ENDSEC;", "END-ISO-10303-21;", ""])
