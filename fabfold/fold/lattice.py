@@ -1,0 +1,171 @@
+"""Folding on the lattice: closure test, planner and shortcut for a hinge system.
+
+Every hinge axis is an edge of the lattice, so every state in which all hinges stand at multiples
+of 90° has its cubes on the lattice. A move turns one hinge by 90°, and whether it collides is
+read from a table of the cells that a turning cube sweeps (:mod:`fabfold.fold.sweep`).
+
+A state is valid when no two cells coincide and no two hinge barrels lie on one lattice edge.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.fold.mechanism import Mechanism, Scene, mechanism, scene
+from fabfold.fold.planner import plan
+from fabfold.fold.shortcut import follow, shorten
+from fabfold.fold.sweep import SweepTable, sweep_table
+from fabfold.fold.turns import count_stuck
+from fabfold.tree.system import HingeSystem
+
+__all__ = ["REPULSION", "Plan", "closure", "find_path", "free_moves", "refined"]
+
+#: Weight of the repulsion between bodies against one step, see :func:`fabfold.fold.planner.plan`.
+REPULSION = 0.05
+
+
+class Plan(NamedTuple):
+    """What the planner found.
+
+    Attributes
+    ----------
+    levels : int
+        Quarter turns by which the two ends of the search still differ; 0 when they met.
+    total : int
+        Quarter turns from A to B.
+    expansions : int
+        States expanded.
+    path : (m, 2) int32 array or None
+        Hinge index and signed quarter turns about its positive axis, one row a move.
+    """
+
+    levels: int
+    total: int
+    expansions: int
+    path: NDArray[np.int32] | None
+
+
+def _ready(system: HingeSystem) -> tuple[Mechanism, Scene, SweepTable]:
+    mech = mechanism(system)
+    return mech, scene(mech), sweep_table(2 * mech.reach)
+
+
+def closure(system: HingeSystem) -> tuple[int, int]:
+    """Hinges that nothing can ever set free, from shape A and from shape B.
+
+    Necessary, not sufficient: (0, 0) does not mean that the system folds.
+
+    See Also
+    --------
+    fabfold.fold.turns.count_stuck : the test.
+    """
+    mech, at, table = _ready(system)
+    start = np.zeros(len(mech.up), dtype=np.int8)
+    return (
+        int(count_stuck(mech, at, table, start, 1)),
+        int(count_stuck(mech, at, table, mech.steps.astype(np.int8), -1)),
+    )
+
+
+def _merged(system: HingeSystem, mech: Mechanism, steps: NDArray[np.int16]) -> NDArray[np.int32]:
+    """Steps of the mechanism as moves of the system, neighbours of one hinge in one move."""
+    moves: list[list[int]] = []
+    for k, way in steps.tolist():
+        hinge = int(mech.origin[k])
+        quarter = way if system.turns[hinge] > 0 else -way
+        if moves and moves[-1][0] == hinge:
+            moves[-1][1] += quarter
+            if moves[-1][1] == 0:
+                moves.pop()
+        else:
+            moves.append([hinge, quarter])
+    return np.array(moves, dtype=np.int32).reshape(-1, 2)
+
+
+def find_path(
+    system: HingeSystem,
+    expansions: int = 2500,
+    patience: int = 400,
+    *,
+    repulsion: float = REPULSION,
+    short: bool = True,
+) -> Plan:
+    """Search a folding path, one hinge at a time.
+
+    Parameters
+    ----------
+    system : HingeSystem
+    expansions : int
+        States that may be expanded in all.
+    patience : int
+        Expansions without progress after which a side of the search gives way to the other.
+    repulsion : float
+        Weight of the preference for open states.
+    short : bool
+        Shorten the path afterwards.
+
+    Returns
+    -------
+    Plan
+    """
+    mech, at, table = _ready(system)
+    total = int(mech.steps.sum())
+    levels, used, steps = plan(mech, at, table, expansions, patience, repulsion)
+    if levels > 0:
+        return Plan(int(levels), total, int(used), None)
+    if short:
+        steps = shorten(mech, at, table, steps)
+    return Plan(0, total, int(used), _merged(system, mech, steps))
+
+
+def free_moves(system: HingeSystem, path: NDArray[np.integer]) -> int:
+    """How many moves of a path from A are free of collision, by the table.
+
+    Parameters
+    ----------
+    system : HingeSystem
+    path : (m, 2) integer array
+        Hinge and signed quarter turns.
+
+    Returns
+    -------
+    int
+        ``len(path)`` when the whole path is free.
+    """
+    mech, at, table = _ready(system)
+    place = np.argsort(mech.origin)
+    q = np.zeros(len(mech.up), dtype=np.int8)
+    for count, (hinge, turns) in enumerate(np.asarray(path, dtype=int).reshape(-1, 2).tolist()):
+        way = 1 if turns * int(system.turns[hinge]) > 0 else -1
+        part = np.tile(np.array([[place[hinge], way]], dtype=np.int16), (abs(turns), 1))
+        if follow(mech, at, table, q, part) < len(part):
+            return count
+    return len(path)
+
+
+def refined(system: HingeSystem, octants: NDArray[np.bool_]) -> HingeSystem:
+    """The same system on the lattice of half cells, with only the octants that hold material.
+
+    Parameters
+    ----------
+    system : HingeSystem
+    octants : (n, 2, 2, 2) bool array
+        Which eighths of each cell, in shape A, are to count.
+
+    Returns
+    -------
+    HingeSystem
+        Cell ``x`` becomes the half cells ``2 x`` and ``2 x + 1``; lengths double.
+    """
+    kept = np.argwhere(np.asarray(octants, dtype=bool).reshape(-1, 2, 2, 2))
+    return HingeSystem(
+        cells=(2 * np.asarray(system.cells)[kept[:, 0]] + kept[:, 1:]).astype(np.int32),
+        body=np.asarray(system.body)[kept[:, 0]].astype(np.int32),
+        parent=system.parent,
+        point2=(2 * np.asarray(system.point2) + 1).astype(np.int32),
+        axis=system.axis,
+        turns=system.turns,
+    )

@@ -1,0 +1,221 @@
+"""Whether a hinge may make its next quarter turn, and which bodies stand in its way."""
+
+# mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, edge_slot, pose_scene
+from fabfold.fold.sweep import SweepTable
+from fabfold.lattice import ROTATIONS
+
+__all__ = ["count_stuck", "obstacles", "turn_is_free"]
+
+
+@njit(cache=True)
+def _world_turn(
+    mech: Mechanism, at: Scene, k: int, way: int, pivot: NDArray[np.int64]
+) -> tuple[int, int]:
+    """World axis and sense of a step of hinge `k`; `pivot` gets twice its point."""
+    b = mech.up[k]
+    r = at.rotation[b]
+    axis = 0
+    sense = way * mech.sign[k]
+    for i in range(3):
+        pivot[i] = 2 * (at.shift[b, i] + mech.reach) + (
+            ROTATIONS[r, i, 0] * mech.pivot[k, 0]
+            + ROTATIONS[r, i, 1] * mech.pivot[k, 1]
+            + ROTATIONS[r, i, 2] * mech.pivot[k, 2]
+        )
+        entry = ROTATIONS[r, i, mech.axis[k]]
+        if entry != 0:
+            axis = i
+            sense *= entry
+    return axis, sense
+
+
+@njit(cache=True)
+def obstacles(  # noqa: PLR0912 - one pass, kept whole for speed
+    mech: Mechanism,
+    at: Scene,
+    table: SweepTable,
+    k: int,
+    way: int,
+    found: NDArray[np.int32],
+) -> int:
+    """What hinders hinge `k` in its next step forward (`way` 1) or back (-1).
+
+    Parameters
+    ----------
+    mech, at
+        The mechanism and its scene, posed.
+    table
+        Sweeps up to the reach of the mechanism, see :func:`fabfold.fold.sweep.sweep_table`.
+    found : (m, 2) int32 array
+        Gets pairs (moving body, body in its way), with repetitions.
+
+    Returns
+    -------
+    int
+        Number of pairs; counting stops when `found` is full, and at one if it has no room.
+    """
+    pivot = np.empty(3, np.int64)
+    axis, sense = _world_turn(mech, at, k, way, pivot)
+    side = 2 * mech.reach + 1
+    stride = (side * side, side, 1)
+    u = (axis + 1) % 3
+    v = (axis + 2) % 3
+    if sense < 0:  # seen in a mirror, a clockwise turn is a counter-clockwise one
+        u, v = v, u
+    su = stride[u]
+    sv = stride[v]
+    cu = (pivot[u] + 1) >> 1
+    cv = (pivot[v] + 1) >> 1
+    low = k + 1
+    high = mech.end[k]
+    limit = max(1, len(found))
+    count = 0
+    for body in range(low, high):
+        for c in range(mech.first[body], mech.first[body + 1]):
+            du = at.world[c, u] - cu
+            dv = at.world[c, v] - cv
+            base = at.world[c, axis] * stride[axis] + cu * su + cv * sv
+            # Turn the cell's quadrant into the first one, and what it sweeps back again.
+            if du >= 0:
+                if dv >= 0:
+                    a, b, sa, sb = du, dv, su, sv
+                else:
+                    a, b, sa, sb = -dv - 1, du, -sv, su
+                    base -= sv
+            elif dv >= 0:
+                a, b, sa, sb = dv, -du - 1, sv, -su
+                base -= su
+            else:
+                a, b, sa, sb = -du - 1, -dv - 1, -su, -sv
+                base -= su + sv
+            entry = a * table.side + b
+            for i in range(table.start[entry], table.start[entry + 1]):
+                owner = at.grid[base + table.cells[i, 0] * sa + table.cells[i, 1] * sb]
+                if owner != 0 and (owner - 1 < low or owner - 1 >= high):
+                    if count < len(found):
+                        found[count, 0] = body
+                        found[count, 1] = owner - 1
+                    count += 1
+                    if count >= limit:
+                        return count
+    middle = np.empty(3, np.int64)
+    for e in range(len(at.edge)):
+        g = mech.barrel[e, 0]
+        if g <= k or g + 1 >= high:
+            continue
+        middle[axis] = at.edge[e, 1 + axis]
+        middle[u] = pivot[u] - (at.edge[e, 1 + v] - pivot[v])
+        middle[v] = pivot[v] + (at.edge[e, 1 + u] - pivot[u])
+        along = at.edge[e, 0]
+        if along != axis:
+            along = u if along == v else v
+        other = at.edges[edge_slot(side, along, middle[0], middle[1], middle[2])] - 1
+        if other >= 0 and (other < k or other + 1 >= high):
+            if count < len(found):
+                found[count, 0] = mech.up[g]
+                inside = other + 1 <= low < mech.end[other]
+                found[count, 1] = other + 1 if inside else mech.up[other]
+            count += 1
+            if count >= limit:
+                return count
+    return count
+
+
+@njit(cache=True)
+def turn_is_free(mech: Mechanism, at: Scene, table: SweepTable, k: int, way: int) -> bool:
+    """Whether hinge `k` can make its next step without a collision, ending in a valid state."""
+    return obstacles(mech, at, table, k, way, np.empty((0, 2), np.int32)) == 0
+
+
+@njit(cache=True)
+def count_stuck(  # noqa: PLR0912 - one pass
+    mech: Mechanism, at: Scene, table: SweepTable, q: NDArray[np.int8], way: int
+) -> int:
+    """Closure test: hinges that nothing can ever set free, starting from state `q`.
+
+    A hinge counts as movable when every pair of bodies that blocks its first turn has an already
+    movable hinge on its path in the tree; repeated until nothing changes. A hinge that stays
+    behind is hopeless: what blocks it never moves against it. The converse does not hold.
+
+    Parameters
+    ----------
+    q : (h,) int8 array
+        Lattice state to leave.
+    way : int
+        1: every hinge wants to step forward, -1: back.
+
+    Returns
+    -------
+    int
+        Hinges that are not movable; all of them if the state itself is not valid.
+    """
+    hinges = len(mech.up)
+    words = (hinges + 63) // 64
+    good = pose_scene(mech, at, q)
+    if not good:
+        clear_scene(mech, at)
+        return hinges
+    path = np.zeros((hinges + 1, words), np.uint64)
+    one = np.uint64(1)
+    for k in range(hinges):
+        path[k + 1] = path[mech.up[k]]
+        path[k + 1, k // 64] |= one << np.uint64(k % 64)
+    found = np.empty((1024, 2), np.int32)
+    masks = np.empty((256, words), np.uint64)
+    start = np.zeros(hinges + 1, np.int32)
+    seen = np.zeros((hinges + 1, hinges + 1), np.int32)
+    used = 0
+    for k in range(hinges):
+        count = obstacles(mech, at, table, k, way, found) if mech.steps[k] > 0 else 0
+        while count == len(found):
+            found = np.empty((4 * len(found), 2), np.int32)
+            count = obstacles(mech, at, table, k, way, found)
+        for i in range(count):
+            a = found[i, 0]
+            b = found[i, 1]
+            if seen[a, b] == k + 1:
+                continue
+            seen[a, b] = k + 1
+            if used == len(masks):
+                wider = np.empty((2 * len(masks), words), np.uint64)
+                wider[:used] = masks
+                masks = wider
+            for w in range(words):
+                masks[used, w] = path[a, w] ^ path[b, w]
+            used += 1
+        start[k + 1] = used
+    clear_scene(mech, at)
+
+    movable = np.zeros(words, np.uint64)
+    loose = np.zeros(hinges, np.bool_)
+    left = hinges
+    changed = True
+    while changed:
+        changed = False
+        for k in range(hinges):
+            if loose[k]:
+                continue
+            free = True
+            for i in range(start[k], start[k + 1]):
+                hit = False
+                for w in range(words):
+                    if masks[i, w] & movable[w] != 0:
+                        hit = True
+                        break
+                if not hit:
+                    free = False
+                    break
+            if free:
+                loose[k] = True
+                movable[k // 64] |= one << np.uint64(k % 64)
+                left -= 1
+                changed = True
+    return left
