@@ -101,7 +101,7 @@ def plan_struts(
     solid : (x, y, z) bool array
         Material.
     pieces : list of (x, y, z) bool arrays
-        The separate pieces of the material.
+        The separate pieces of the material; may be empty if there is only one.
     brackets : list of (x, y, z) bool arrays
         The material of each hinge half inside the free space.
 
@@ -112,8 +112,7 @@ def plan_struts(
     """
     from scipy import ndimage
 
-    core = _core(solid)
-    label, _ = ndimage.label(core)
+    label = _core_parts(pieces or [solid])
     terminals = _terminals(grid, label, pieces, brackets)
     if len(terminals) < 2:
         return []
@@ -135,12 +134,23 @@ def plan_struts(
     return bars
 
 
-def _core(solid: Bools) -> Bools:
-    """Points that belong to a cube of two by two by two points in the material."""
+def _core_parts(pieces: list[Bools]) -> NDArray[np.int32]:
+    """Number, from 1, of the core part that each grid point belongs to; 0 outside.
+
+    A core part is what hangs together of the points that belong to a cube of two by two by two
+    points in one piece of the material. Pieces are taken one by one: the gap between two of them
+    may be too narrow for the grid to show.
+    """
     from scipy import ndimage
 
     cube = np.ones((2, 2, 2), dtype=bool)
-    return np.asarray(ndimage.binary_opening(solid, cube), dtype=bool)
+    parts = np.zeros(pieces[0].shape, dtype=np.int32)
+    count = 0
+    for piece in pieces:
+        label, found = ndimage.label(ndimage.binary_opening(piece, cube))
+        parts = np.where(label > 0, label + count, parts)
+        count += found
+    return parts
 
 
 def _terminals(
