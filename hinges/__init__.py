@@ -1,1 +1,58 @@
-"""Parametric print-in-place hinges for build123d and CadQuery."""
+"""Parametric print-in-place hinges for build123d and CadQuery.
+
+>>> from hinges import SingleHinge
+>>> hinge = SingleHinge(20, clearance="fdm")
+>>> len(hinge.solids())
+2
+
+The parts are build123d parts; ``import hinges.cadquery`` gives CadQuery the same ones. Nothing
+heavy is imported until it is used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_HOMES = {
+    "Bracket": "leaf",
+    "Clearance": "clearance",
+    "ConePin": "pins",
+    "Coupon": "coupon",
+    "Detents": "stops",
+    "DoubleHinge": "double",
+    "DoubleHingeCarve": "double",
+    "DoubleHingePart": "double",
+    "FilamentPin": "hardware",
+    "FitError": "errors",
+    "HingeCarve": "single",
+    "HingeError": "errors",
+    "HingeHalf": "single",
+    "KernelError": "errors",
+    "Leaf": "leaf",
+    "MagnetPocket": "retention",
+    "Play": "play",
+    "RodPin": "hardware",
+    "ScrewPin": "hardware",
+    "SingleHinge": "single",
+    "SnapDimple": "retention",
+    "SnapTongue": "retention",
+    "Stops": "stops",
+    "StraightPin": "pins",
+    "hinge_location": "single",
+}
+
+__all__ = sorted(_HOMES)  # noqa: PLE0605
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name on first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'hinges' has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

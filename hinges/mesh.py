@@ -26,30 +26,22 @@ one and at most 0.0024 (r + c) above it for 64 segments (0.007 mm at r + c = 2.8
 from __future__ import annotations
 
 from functools import lru_cache
-from math import cos, floor, pi
+from math import cos, pi
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .clearance import Clearance
-from .errors import HingeError
-from .fit import at_least
+from .leaf import Bracket
 from .pins import ConePin
-from .shapes import Prism, Shape
-from .train import groove, lay_out
+from .plan import HalfPlan, SingleSpec, default_pin_radius, default_radii, plan_single
+from .shapes import Moved, Prism, Shape
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-__all__ = [
-    "HingeMeshes",
-    "MeshPart",
-    "default_pin_radius",
-    "default_radii",
-    "single_hinge_meshes",
-    "solid_of",
-]
+__all__ = ["HingeMeshes", "MeshPart", "half_of", "part_of", "single_hinge_meshes", "solid_of"]
 
 
 class MeshPart(NamedTuple):
@@ -95,49 +87,6 @@ class HingeMeshes(NamedTuple):
     reach_mm: float
 
 
-def _widening(clearance: Clearance) -> float:
-    """How much a 45° recess is wider than its cone, in mm."""
-    return ConePin(1.0).widening(clearance)
-
-
-def default_radii(
-    length: float, clearance: Clearance, wall: float = 0.8, knuckles: int = 3
-) -> tuple[float, float]:
-    """Choose a barrel and pin radius for a cone-pinned hinge on an edge.
-
-    Parameters
-    ----------
-    length : float
-        Of the edge in mm.
-    clearance : Clearance
-    wall : float
-        Thinnest wall in mm.
-    knuckles : int
-
-    Returns
-    -------
-    barrel, pin : float
-        In mm: the barrel nearest to an eighth of the edge (at most 5) that the rules of fit
-        accept, and 60 % of it or as much as the wall leaves; 2.5 and 1.5 on an edge of 20 mm with
-        0.3 mm clearance. An eighth of the edge when none fits.
-    """
-    wanted = min(length / 8.0, 5.0)
-    for step in (0, *(sign * n for n in range(1, 21) for sign in (1, -1))):
-        barrel = round(wanted * (1.0 + 0.02 * step), 3)
-        try:
-            pin = ConePin(default_pin_radius(barrel, clearance, wall))
-            pin.check(lay_out(length, knuckles, barrel, clearance, barrel + clearance.radial), wall)
-        except HingeError:
-            continue
-        return barrel, pin.radius
-    return wanted, default_pin_radius(wanted, clearance, wall)
-
-
-def default_pin_radius(barrel: float, clearance: Clearance, wall: float = 0.8) -> float:
-    """Choose a cone's foot radius: 60 % of the barrel, or as much as the wall leaves (mm)."""
-    return floor(1000.0 * min(0.6 * barrel, barrel - wall - _widening(clearance)) + 1e-6) / 1000.0
-
-
 def solid_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
     """Turn a shape into a manifold that never takes room from a clearance.
 
@@ -154,6 +103,9 @@ def solid_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
     """
     from manifold3d import CrossSection, FillRule, Manifold
 
+    if isinstance(shape, Moved):
+        frame = np.column_stack((shape.x_dir, shape.y_dir, shape.z_dir, shape.origin))
+        return solid_of(shape.shape, segments, outside=outside).transform(frame)
     if isinstance(shape, Prism):
         section = CrossSection([list(shape.outline)], FillRule.Positive)
         return Manifold.extrude(section, shape.end - shape.start).translate((0, 0, shape.start))
@@ -164,7 +116,37 @@ def solid_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
     grown = outwards > 0.0 if outside else outwards < 0.0
     grown = (grown | np.roll(grown, 1)) & (outline[:, 0] > 0.0)
     outline[grown, 0] /= cos(pi / segments)
-    return Manifold.revolve(CrossSection([outline], FillRule.NonZero), segments)
+    section = CrossSection([outline], FillRule.NonZero)
+    if shape.turn >= 360.0:
+        return Manifold.revolve(section, segments)
+    part = Manifold.revolve(section, segments, shape.turn)
+    return part.rotate((0.0, 0.0, shape.begin))
+
+
+def half_of(plan: HalfPlan, segments: int) -> tuple[Manifold, Manifold]:
+    """Build a half and its carve from their plan.
+
+    Parameters
+    ----------
+    plan : HalfPlan
+    segments : int
+        Corners of a full circle.
+
+    Returns
+    -------
+    half, carve : Manifold
+    """
+    from manifold3d import Manifold, OpType
+
+    def united(shapes: tuple[Shape, ...], outside: bool) -> Manifold:
+        built = [solid_of(shape, segments, outside=outside) for shape in shapes]
+        return Manifold.batch_boolean(built, OpType.Add) if len(built) > 1 else built[0]
+
+    carve = united(plan.carve, True)
+    half = (united(plan.web, False) - carve) + united(plan.add, False)
+    if plan.bore:
+        half -= united(plan.bore, True)
+    return half, carve
 
 
 def part_of(solid: Manifold) -> MeshPart:
@@ -233,45 +215,34 @@ def _single(
     wall_mm: float = 0.8,
     segments: int = 64,
 ) -> HingeMeshes:
-    clearance = Clearance(clearance_mm)
-    barrel, thick = default_radii(voxel_mm, clearance, wall_mm, knuckles)
-    if barrel_radius_mm is not None:
-        barrel = barrel_radius_mm
-        thick = default_pin_radius(barrel, clearance, wall_mm)
-    pin = ConePin(thick if pin_radius_mm is None else pin_radius_mm)
-    reach = barrel + clearance.radial
-    margin = reach if margin_mm is None else margin_mm
-    train = lay_out(voxel_mm, knuckles, barrel, clearance, margin)
-    pin.check(train, wall_mm)
-    half_gap = 0.5 * (clearance_mm if gap_mm is None else gap_mm)
+    room = Clearance(clearance_mm)
+    barrel = barrel_radius_mm
+    if barrel is None:
+        barrel, _ = default_radii(voxel_mm, room, wall_mm, knuckles, margin_mm, widest=5.0)
+    pin = default_pin_radius(barrel, room, wall_mm) if pin_radius_mm is None else pin_radius_mm
+    reach = barrel + room.radial
     bracket = max(0.15 * voxel_mm, reach + 1.2) if bracket_mm is None else bracket_mm
-    at_least(
-        "bracket",
-        "the bracket's material behind the groove",
-        bracket - reach,
-        wall_mm,
-        "use a wider bracket or a smaller barrel",
+    spec = SingleSpec.read(
+        voxel_mm,
+        knuckles=knuckles,
+        radius=barrel,
+        pin=ConePin(pin),
+        clearance=room,
+        leaf=Bracket(bracket),
+        gap=gap_mm,
+        margin=margin_mm,
+        wall=wall_mm,
     )
-    core = 0.5 * (pin.reach(clearance) + barrel)
-    carves = [solid_of(groove(train, owner, core), segments, outside=True) for owner in (0, 1)]
-    halves = []
-    for owner, side in ((0, -1.0), (1, 1.0)):
-        near, far = side * half_gap, side * bracket
-        west, east = min(near, far), max(near, far)
-        corners = ((west, -bracket), (east, -bracket), (east, -half_gap), (west, -half_gap))
-        half = solid_of(Prism(corners, train.start, train.end), segments, outside=False)
-        half -= carves[owner]
-        for whose, shape in pin.knuckles(train, 0.0):
-            if whose == owner:
-                half += solid_of(shape, segments, outside=False)
-        halves.append(half)
+    plan = plan_single(spec)
+    parent, parent_carve = half_of(plan.parent, segments)
+    child, child_carve = half_of(plan.child, segments)
     return HingeMeshes(
-        part_of(halves[0]),
-        part_of(halves[1]),
-        part_of(carves[0]),
-        part_of(carves[1]),
+        part_of(parent),
+        part_of(child),
+        part_of(parent_carve),
+        part_of(child_carve),
         barrel,
-        pin.radius,
+        pin,
         knuckles,
         reach,
     )

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos, radians, sin
 
-__all__ = ["Prism", "Shape", "Turned", "cylinder"]
+__all__ = ["Moved", "Point", "Prism", "Shape", "Turned", "box", "cylinder", "regular", "teardrop"]
 
 Point = tuple[float, float]
+Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -17,9 +19,13 @@ class Turned:
     ----------
     outline : tuple of (radius, z)
         In mm, at least three corners, all radii at or above 0.
+    begin, turn : float
+        First direction and angle of the turn in degrees, counter-clockwise from +x.
     """
 
     outline: tuple[Point, ...]
+    begin: float = 0.0
+    turn: float = 360.0
 
 
 @dataclass(frozen=True)
@@ -29,7 +35,7 @@ class Prism:
     Attributes
     ----------
     outline : tuple of (x, y)
-        In mm, convex.
+        In mm, counter-clockwise.
     start, end : float
         z of the two flat ends in mm.
     """
@@ -39,9 +45,72 @@ class Prism:
     end: float
 
 
-Shape = Turned | Prism
+@dataclass(frozen=True)
+class Moved:
+    """A shape laid into another frame.
+
+    Attributes
+    ----------
+    shape : Turned, Prism or Moved
+    origin : (x, y, z)
+        Where the shape's origin goes, in mm.
+    z_dir, x_dir : (x, y, z)
+        Where its z and x axes point; unit vectors at right angles.
+    """
+
+    shape: Shape
+    origin: Vector = (0.0, 0.0, 0.0)
+    z_dir: Vector = (0.0, 0.0, 1.0)
+    x_dir: Vector = (1.0, 0.0, 0.0)
+
+    @property
+    def y_dir(self) -> Vector:
+        """Where the shape's y axis points."""
+        (a, b, c), (d, e, f) = self.z_dir, self.x_dir
+        return (b * f - c * e, c * d - a * f, a * e - b * d)
+
+
+Shape = Turned | Prism | Moved
 
 
 def cylinder(radius: float, start: float, end: float) -> Turned:
     """Turn a plain cylinder on the z axis from `start` to `end` (mm)."""
     return Turned(((0.0, start), (radius, start), (radius, end), (0.0, end)))
+
+
+def box(west: float, east: float, south: float, north: float, start: float, end: float) -> Prism:
+    """Draw a box from its limits in x (west, east), y (south, north) and z (start, end), mm."""
+    return Prism(((west, south), (east, south), (east, north), (west, north)), start, end)
+
+
+def regular(corners: int, across_flats: float, start: float, end: float, first: float) -> Prism:
+    """Draw a regular prism, such as a nut, with one corner in direction `first` (degrees)."""
+    radius = 0.5 * across_flats / cos(radians(180.0 / corners))
+    steps = (radians(first + 360.0 * i / corners) for i in range(corners))
+    return Prism(tuple((radius * cos(a), radius * sin(a)) for a in steps), start, end)
+
+
+def teardrop(radius: float, start: float, end: float, up: float) -> Prism:
+    """Draw the roof that makes a lying round bore printable without support.
+
+    Parameters
+    ----------
+    radius : float
+        Of the bore in mm. The roof touches it at 45° on both sides and is cut flat at 1.2 radii.
+    start, end : float
+        Ends in z, mm.
+    up : float
+        Direction of printing in degrees from +x about the axis.
+    """
+    flat = 1.2
+    side, top = 0.5**0.5, 2.0**0.5 - flat
+    corners = ((-side, side), (0.0, 0.0), (side, side), (top, flat), (-top, flat))
+    turn = radians(up - 90.0)
+    return Prism(
+        tuple(
+            (radius * (x * cos(turn) - y * sin(turn)), radius * (x * sin(turn) + y * cos(turn)))
+            for x, y in corners
+        ),
+        start,
+        end,
+    )

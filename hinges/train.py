@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .clearance import Clearance
@@ -13,7 +14,7 @@ __all__ = ["Span", "Train", "groove", "lay_out"]
 
 @dataclass(frozen=True)
 class Span:
-    """One knuckle: its owner (0 parent, 1 child, ...) and its two end planes (z, mm)."""
+    """One knuckle: its owner (0 parent, 1 child or link, 2 ...) and its two end planes (z, mm)."""
 
     owner: int
     start: float
@@ -34,21 +35,25 @@ class Train:
     radius : float
         Of the barrels, in mm.
     spans : tuple of Span
+        Neighbours have different owners and the axial clearance between them.
     clearance : Clearance
+    holder : int
+        The owner that carries printed pins, and grips a loose one.
     """
 
     radius: float
     spans: tuple[Span, ...]
     clearance: Clearance
+    holder: int = 0
 
     @property
     def start(self) -> float:
-        """Z of the first end plane in mm."""
+        """First end plane along z in mm."""
         return self.spans[0].start
 
     @property
     def end(self) -> float:
-        """Z of the last end plane in mm."""
+        """Last end plane along z in mm."""
         return self.spans[-1].end
 
     @property
@@ -61,8 +66,16 @@ class Train:
         return tuple(span for span in self.spans if span.owner == owner)
 
 
-def lay_out(length: float, count: int, radius: float, clearance: Clearance, margin: float) -> Train:
-    """Divide an edge among alternating knuckles of parent and child, the parent's first.
+def lay_out(
+    length: float,
+    count: int,
+    radius: float,
+    clearance: Clearance,
+    margin: float,
+    owners: Sequence[int] = (0, 1),
+    holder: int = 0,
+) -> Train:
+    """Divide an edge among knuckles of equal length.
 
     Parameters
     ----------
@@ -76,6 +89,10 @@ def lay_out(length: float, count: int, radius: float, clearance: Clearance, marg
         The axial value stands between neighbours.
     margin : float
         Left free at both ends of the edge, in mm.
+    owners : sequence of int
+        Repeated over the knuckles: parent and child in turn by default.
+    holder : int
+        The owner that carries printed pins, and grips a loose one.
 
     Returns
     -------
@@ -86,8 +103,13 @@ def lay_out(length: float, count: int, radius: float, clearance: Clearance, marg
     HingeError
         If there are fewer than 2 knuckles or no room for them.
     """
-    if count < 2:
-        raise HingeError(f"a hinge needs at least 2 knuckles, {count} given")
+    if count < 2 or int(count) != count:
+        raise HingeError(f"a hinge needs a whole number of at least 2 knuckles, {count} given")
+    if radius <= 0.0 or length <= 0.0 or margin < 0.0:
+        raise HingeError(
+            f"edge length {length:g} mm and barrel radius {radius:g} mm must be above 0, and the "
+            f"margin {margin:g} mm must not be negative"
+        )
     room = length - 2.0 * margin - (count - 1) * clearance.axial
     each = room / count
     if each <= 0.0:
@@ -97,8 +119,11 @@ def lay_out(length: float, count: int, radius: float, clearance: Clearance, marg
         )
     first = -0.5 * length + margin
     pitch = each + clearance.axial
-    spans = tuple(Span(i % 2, first + i * pitch, first + i * pitch + each) for i in range(count))
-    return Train(radius, spans, clearance)
+    spans = tuple(
+        Span(owners[i % len(owners)], first + i * pitch, first + i * pitch + each)
+        for i in range(count)
+    )
+    return Train(radius, spans, clearance, holder)
 
 
 def groove(train: Train, owner: int, core: float) -> Turned:
@@ -122,19 +147,21 @@ def groove(train: Train, owner: int, core: float) -> Turned:
     """
     axial = train.clearance.axial
     outline: list[Point] = []
+    last = len(train.spans) - 1
     for index, span in enumerate(train.spans):
-        own = span.owner == owner
-        start, end, radius = span.start, span.end, core if own else train.reach
-        before = train.spans[index - 1].owner if index else owner
-        after = train.spans[index + 1].owner if index + 1 < len(train.spans) else owner
-        if own:
-            start -= axial if before == owner and index else 0.0
-        else:
-            start -= axial if before == owner else 0.5 * axial
-            end += axial if after == owner else 0.5 * axial
-        outline += [(radius, start), (radius, end)]
+        if span.owner == owner:
+            outline += [(core, span.start), (core, span.end)]
+            continue
+        shared_before = index > 0 and train.spans[index - 1].owner != owner
+        shared_after = index < last and train.spans[index + 1].owner != owner
+        start = span.start - axial * (0.5 if shared_before else 1.0)
+        end = span.end + axial * (0.5 if shared_after else 1.0)
+        outline += [(train.reach, start), (train.reach, end)]
     corners: list[Point] = [(0.0, outline[0][1])]
     for corner in [*outline, (0.0, outline[-1][1])]:
-        if corner != corners[-1]:
-            corners.append(corner)
+        if corner[0] == corners[-1][0] and abs(corner[1] - corners[-1][1]) < 1e-9:
+            continue
+        if abs(corner[1] - corners[-1][1]) < 1e-9:  # one plane, whatever the rounding
+            corner = (corner[0], corners[-1][1])  # noqa: PLW2901
+        corners.append(corner)
     return Turned(tuple(corners))

@@ -1,0 +1,102 @@
+"""Exact solids from planned shapes, through build123d's own interface only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from .errors import HingeError
+from .plan import HalfPlan
+from .shapes import Moved, Prism, Shape
+
+if TYPE_CHECKING:
+    import build123d as bd
+
+__all__ = ["build_all", "build_half", "build_shape", "one_part"]
+
+
+def build_shape(shape: Shape) -> bd.Solid:
+    """Build one primitive.
+
+    Returns
+    -------
+    Solid
+        In mm.
+    """
+    import build123d as bd
+
+    if isinstance(shape, Moved):
+        frame = bd.Plane(origin=shape.origin, x_dir=shape.x_dir, z_dir=shape.z_dir)
+        return build_shape(shape.shape).moved(frame.location)
+    if isinstance(shape, Prism):
+        rim = bd.Wire.make_polygon([(x, y, shape.start) for x, y in shape.outline], close=True)
+        return bd.Solid.extrude(bd.Face(rim), bd.Vector(0, 0, shape.end - shape.start))
+    rim = bd.Wire.make_polygon([(r, 0, z) for r, z in shape.outline], close=True)
+    turned = bd.Solid.revolve(bd.Face(rim), shape.turn, bd.Axis.Z)
+    return turned.rotate(bd.Axis.Z, shape.begin) if shape.begin else turned
+
+
+def solids_of(shape: bd.Shape | Iterable[bd.Shape]) -> list[bd.Solid]:
+    """List the solids of whatever a boolean operation gave."""
+    if hasattr(shape, "solids"):
+        return list(shape.solids())
+    return [solid for piece in shape for solid in piece.solids()]
+
+
+def one_part(solids: Sequence[bd.Solid]) -> bd.Part:
+    """Gather solids in one Part."""
+    import build123d as bd
+
+    return bd.Part(list(solids))
+
+
+def build_all(shapes: Sequence[Shape]) -> bd.Part:
+    """Build shapes and unite them; neighbours that only touch stay apart."""
+    built = [build_shape(shape) for shape in shapes]
+    if len(built) < 2:
+        return one_part(built)
+    return one_part(solids_of(built[0].fuse(*built[1:])))
+
+
+def build_half(plan: HalfPlan, name: str) -> bd.Part:
+    """Build ``(web - carve) + add - bore``.
+
+    Parameters
+    ----------
+    plan : HalfPlan
+    name : str
+        Of the half, for messages.
+
+    Returns
+    -------
+    Part
+        Exactly one valid solid.
+
+    Raises
+    ------
+    HingeError
+        If the kernel returned anything else.
+    """
+    carves = [build_shape(shape) for shape in plan.carve]
+    webs = [build_shape(shape) for shape in plan.web]
+    body = webs[0].fuse(*webs[1:]) if len(webs) > 1 else webs[0]
+    pieces = solids_of(body.cut(*carves) if carves else body)
+    added = [build_shape(shape) for shape in plan.add]
+    whole = pieces[0].fuse(*pieces[1:], *added)
+    if plan.bore:
+        solids = solids_of(whole)
+        whole = solids[0].cut(*(build_shape(shape) for shape in plan.bore))
+        pieces = solids[1:] + solids_of(whole)
+    else:
+        pieces = solids_of(whole)
+    if len(pieces) != 1 or not _valid(pieces[0]):
+        raise HingeError(
+            f"the {name} half came out as {len(pieces)} solids, not as one valid solid: check that "
+            "its bracket or leaf reaches all of its knuckles, or move a size by a hundredth of a mm"
+        )
+    return one_part(pieces)
+
+
+def _valid(solid: bd.Solid) -> bool:
+    valid = solid.is_valid  # a property from build123d 0.10 on, a method before
+    return bool(valid() if callable(valid) else valid)

@@ -1,0 +1,369 @@
+"""A hinge on one axis, as a build123d part."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Literal
+
+from build123d import (
+    Align,
+    Axis,
+    BasePartObject,
+    Color,
+    Location,
+    Mode,
+    Part,
+    Plane,
+    RevoluteJoint,
+    RigidJoint,
+    Rotation,
+    Solid,
+)
+
+from .brep import build_all, build_half, build_shape, one_part, solids_of
+from .clearance import Clearance
+from .errors import HingeError
+from .leaf import Bracket, Leaf
+from .pins import Pin
+from .plan import SinglePlan, SingleSpec, plan_single
+from .stops import Detents, Stops
+
+if TYPE_CHECKING:
+    from build123d import RotationLike, VectorLike
+
+__all__ = ["HingeCarve", "HingeHalf", "SingleHinge", "hinge_location"]
+
+Side = Literal["parent", "child"]
+PARENT_COLOR = (0.20, 0.45, 0.70)
+CHILD_COLOR = (0.90, 0.55, 0.15)
+
+
+@lru_cache(maxsize=128)
+def _half(spec: SingleSpec, side: Side) -> Solid:
+    plan = plan_single(spec)
+    return build_half(plan.parent if side == "parent" else plan.child, side).solid()
+
+
+@lru_cache(maxsize=128)
+def _carve(spec: SingleSpec, side: Side) -> tuple[Solid, ...]:
+    plan = plan_single(spec)
+    return tuple(build_all((plan.parent if side == "parent" else plan.child).carve).solids())
+
+
+def _posed(spec: SingleSpec, side: Side, solids: tuple[Solid, ...]) -> Part:
+    turn = Rotation(0, 0, spec.angle if side == "child" else 0.0)
+    return one_part([solid.moved(turn) for solid in solids])
+
+
+def _side(side: str) -> Side:
+    if side == "parent":
+        return "parent"
+    if side == "child":
+        return "child"
+    raise HingeError(f"side {side!r}: use 'parent' or 'child'")
+
+
+def hinge_location(origin: VectorLike, along: VectorLike, outwards: VectorLike) -> Location:
+    """Lay the hinge's frame on an edge of a part.
+
+    Parameters
+    ----------
+    origin : VectorLike
+        Middle of the edge.
+    along : VectorLike
+        Along the edge. The child's material is on the side ``outwards × along``.
+    outwards : VectorLike
+        Out of the two bodies, in the face that they share.
+
+    Returns
+    -------
+    Location
+
+    Raises
+    ------
+    HingeError
+        If the two directions are not at right angles.
+    """
+    from build123d import Vector
+
+    z_dir, y_dir = Vector(*along).normalized(), Vector(*outwards).normalized()
+    if abs(z_dir.dot(y_dir)) > 1e-6:
+        raise HingeError("the outward direction must be at right angles to the edge")
+    return Plane(origin=origin, x_dir=y_dir.cross(z_dir), z_dir=z_dir).location
+
+
+class SingleHinge(BasePartObject):  # type: ignore[misc]
+    """A print-in-place or pinned hinge on one axis: two halves that turn about z.
+
+    The axis is z through the origin, with the hinge centred on it. At angle 0 the parent's
+    material lies in the quadrant x < 0, y < 0 and the child's in x > 0, y < 0, as two boxes side by
+    side that share the face x = 0; y points out of that face. The child turns about +z, and lies
+    on the parent at 180°.
+
+    Parameters
+    ----------
+    length : float
+        Of the edge that the hinge is for, in mm.
+    knuckles : int
+        2 or more, odd or even; the parent has the odd one.
+    radius : float, optional
+        Of the barrel in mm. From the length, or from the pin, when left out.
+    pin : Pin, optional
+        :class:`ConePin` (default), :class:`StraightPin`, :class:`FilamentPin`,
+        :class:`ScrewPin` or :class:`RodPin`.
+    clearance : Clearance, float or str
+        A :class:`Clearance`, mm, a length such as "300 um", or a process: "fdm", "sla", "sls",
+        "mjf", "polyjet".
+    leaf : Bracket or Leaf, optional
+        What joins the knuckles: a bar inside the body (default), or a door hinge's plate.
+    gap : float, optional
+        Between the two bodies at 0° and 180° in mm; the radial clearance when left out.
+    angle : float
+        The pose that it is drawn (and printed) in, degrees.
+    angular_range : (float, float)
+        In degrees, within 0 to 180.
+    stops : Stops or bool, optional
+        Heels at the ends of the range; True for one at the upper end.
+    detents : Detents, optional
+        Angles at which it clicks.
+    chamfer : float
+        Of the barrel ends in mm.
+    margin : float, optional
+        Left free at both ends of the edge in mm. With a bracket, the barrel radius plus the
+        clearance, so that hinges on two edges that meet at a corner stay clear of one another;
+        with a leaf, 0.
+    wall : float, optional
+        Thinnest wall in mm; of the process named by `clearance`, or 0.8.
+    bore : {"round", "teardrop", "octagon"}
+        Form of the bores. A hinge printed with its axis lying wants one of the last two.
+    up : float
+        Direction of printing in degrees about the axis from +x; for the bores' roofs.
+    rotation, align, mode
+        As for every build123d part. `align` is None, since the axis has to stay the origin.
+
+    Attributes
+    ----------
+    parent_half, child_half : Part
+        To add to the two bodies, each with a joint named "hinge".
+    parent_carve, child_carve : Part
+        To cut from them first: ``body - carve + half``.
+    hardware : Part or None
+        The loose pin, screw and nut.
+    spec : SingleSpec
+    plan : SinglePlan
+
+    Raises
+    ------
+    FitError
+        If the hinge cannot be printed or cannot turn, naming the rule and what to change.
+    HingeError
+        If a parameter makes no sense.
+
+    Examples
+    --------
+    >>> hinge = SingleHinge(20, clearance=0.3)
+    >>> len(hinge.solids())
+    2
+    >>> hinge.joints["hinge"].angular_range
+    (0.0, 180.0)
+    """
+
+    def __init__(
+        self,
+        length: float,
+        *,
+        knuckles: int = 3,
+        radius: float | None = None,
+        pin: Pin | None = None,
+        clearance: Clearance | float | str = "fdm",
+        leaf: Bracket | Leaf | None = None,
+        gap: float | None = None,
+        angle: float = 0.0,
+        angular_range: tuple[float, float] = (0.0, 180.0),
+        stops: Stops | bool | None = None,
+        detents: Detents | None = None,
+        chamfer: float = 0.0,
+        margin: float | None = None,
+        wall: float | None = None,
+        bore: Literal["round", "teardrop", "octagon"] = "round",
+        up: float = 90.0,
+        rotation: RotationLike = (0, 0, 0),
+        align: Align | tuple[Align, Align, Align] | None = None,
+        mode: Mode = Mode.ADD,
+    ) -> None:
+        self.spec = SingleSpec.read(
+            length,
+            knuckles=knuckles,
+            radius=radius,
+            pin=pin,
+            clearance=clearance,
+            leaf=leaf,
+            gap=gap,
+            angle=angle,
+            angular_range=angular_range,
+            stops=stops,
+            detents=detents,
+            chamfer=chamfer,
+            margin=margin,
+            wall=wall,
+            bore=bore,
+            up=up,
+        )
+        plan_single(self.spec)
+        super().__init__(part=self.make_hinge(), rotation=rotation, align=align, mode=mode)
+        self.label = "hinge"
+        self.color = Color(*PARENT_COLOR)
+        RevoluteJoint("hinge", self, axis=self._axis(), angular_range=self.spec.angular_range)
+        RigidJoint("parent", self, Location())
+
+    def _axis(self) -> Axis:
+        turned = Rotation(*self.rotation) if isinstance(self.rotation, tuple) else self.rotation
+        plane = Plane(Location() * turned)
+        return Axis(plane.origin, plane.z_dir)
+
+    def make_hinge(self) -> Part:
+        """Build both halves in the drawn pose."""
+        return one_part(
+            [
+                *_posed(self.spec, "parent", (_half(self.spec, "parent"),)).solids(),
+                *_posed(self.spec, "child", (_half(self.spec, "child"),)).solids(),
+            ]
+        )
+
+    @property
+    def plan(self) -> SinglePlan:
+        """Every shape of the hinge as data."""
+        return plan_single(self.spec)
+
+    @property
+    def parent_half(self) -> Part:
+        """The parent's knuckles and bracket; its joint "hinge" turns."""
+        return HingeHalf(self, "parent", mode=Mode.PRIVATE)
+
+    @property
+    def child_half(self) -> Part:
+        """The child's knuckles and bracket in the drawn pose; its joint "hinge" is rigid."""
+        return HingeHalf(self, "child", mode=Mode.PRIVATE)
+
+    @property
+    def parent_carve(self) -> Part:
+        """What the parent's body gives up before its half is added."""
+        return HingeCarve(self, "parent", mode=Mode.PRIVATE)
+
+    @property
+    def child_carve(self) -> Part:
+        """What the child's body, in the drawn pose, gives up before its half is added."""
+        return HingeCarve(self, "child", mode=Mode.PRIVATE)
+
+    @property
+    def hardware(self) -> Part | None:
+        """The loose pin, screw and nut, or None for a printed pin."""
+        loose = self.plan.loose
+        if not loose:
+            return None
+        drawn = one_part([build_shape(shape) for shape in loose])
+        drawn.label = "hardware"
+        return drawn
+
+    def fit(
+        self, parent: Part | Solid, child: Part | Solid, at: Location | Plane | None = None
+    ) -> tuple[Part, Part]:
+        """Let the hinge into two bodies.
+
+        Parameters
+        ----------
+        parent, child : Part or Solid
+            The bodies in the drawn pose, at least half the gap away from the faces that they
+            share.
+        at : Location or Plane, optional
+            Where the hinge's frame lies; see :func:`hinge_location`.
+
+        Returns
+        -------
+        parent, child : Part
+            With the joints "hinge" on the axis.
+
+        Raises
+        ------
+        HingeError
+            If a body does not come out in one piece, because it does not meet its half.
+        """
+        place = at.location if isinstance(at, Plane) else (at or Location())
+        made = []
+        for side, body in (("parent", parent), ("child", child)):
+            half = HingeHalf(self, _side(side), mode=Mode.PRIVATE).moved(place)
+            carve = HingeCarve(self, _side(side), mode=Mode.PRIVATE).moved(place)
+            solids = solids_of(solids_of(body)[0].cut(*carve.solids()))
+            fitted = one_part(solids_of(solids[0].fuse(*solids[1:], *half.solids())))
+            if len(fitted.solids()) != len(solids_of(body)):
+                raise HingeError(
+                    f"the {side} body came out in {len(fitted.solids())} pieces: it must reach the "
+                    "bracket of its half, and the carve must not cut it in two"
+                )
+            fitted.label = body.label or side
+            fitted.color = body.color
+            made.append(fitted)
+        self._join(made[0], made[1], place)
+        return made[0], made[1]
+
+    def _join(self, parent: Part, child: Part, place: Location) -> None:
+        plane = Plane(place)
+        axis = Axis(plane.origin, plane.z_dir)
+        joint = RevoluteJoint("hinge", parent, axis=axis, angular_range=self.spec.angular_range)
+        RigidJoint("hinge", child, joint.relative_axis.location * Rotation(0, 0, self.spec.angle))
+
+
+class HingeHalf(BasePartObject):  # type: ignore[misc]
+    """One half of a hinge, to add to its body after :class:`HingeCarve` was cut from it.
+
+    Parameters
+    ----------
+    hinge : SingleHinge
+    side : {"parent", "child"}
+    rotation, align, mode
+        As for every build123d part.
+    """
+
+    def __init__(
+        self,
+        hinge: SingleHinge,
+        side: Side,
+        rotation: RotationLike = (0, 0, 0),
+        align: Align | tuple[Align, Align, Align] | None = None,
+        mode: Mode = Mode.ADD,
+    ) -> None:
+        side = _side(side)
+        part = _posed(hinge.spec, side, (_half(hinge.spec, side),))
+        super().__init__(part=part, rotation=rotation, align=align, mode=mode)
+        self.label = f"{side} half"
+        self.color = Color(*(PARENT_COLOR if side == "parent" else CHILD_COLOR))
+        if side == "parent":
+            RevoluteJoint("hinge", self, axis=Axis.Z, angular_range=hinge.spec.angular_range)
+        else:
+            frame = Axis.Z.location * Rotation(0, 0, hinge.spec.angle)
+            RigidJoint("hinge", self, frame)
+
+
+class HingeCarve(BasePartObject):  # type: ignore[misc]
+    """What a body gives up to a hinge: grooves for the other half's knuckles, and its own bores.
+
+    Parameters
+    ----------
+    hinge : SingleHinge
+    side : {"parent", "child"}
+    rotation, align, mode
+        As for every build123d part; subtracted from the part under construction by default.
+    """
+
+    def __init__(
+        self,
+        hinge: SingleHinge,
+        side: Side,
+        rotation: RotationLike = (0, 0, 0),
+        align: Align | tuple[Align, Align, Align] | None = None,
+        mode: Mode = Mode.SUBTRACT,
+    ) -> None:
+        side = _side(side)
+        part = _posed(hinge.spec, side, _carve(hinge.spec, side))
+        super().__init__(part=part, rotation=rotation, align=align, mode=mode)
+        self.label = f"{side} carve"
