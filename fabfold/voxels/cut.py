@@ -79,7 +79,7 @@ def cut_voxels(
     placement: Placement,
     energy: CellEnergy,
     capacity: Capacity,
-) -> tuple[Voxels | None, int]:
+) -> tuple[Voxels | None, int, int]:
     """Cut the model into voxels.
 
     Parameters
@@ -97,6 +97,8 @@ def cut_voxels(
     -------
     voxels : Voxels or None
         None if the template cannot hold the cells, or no cell is left.
+    kept : int
+        Cells with enough material, in one group.
     excess : int
         Cells for which the template has no room; 0 if it holds them all.
     """
@@ -133,10 +135,10 @@ def cut_voxels(
             order = small[np.argsort(weight[small], kind="stable")]
             doomed.extend(order[: surplus[which]].tolist())
         if len(doomed) < excess:
-            return None, excess
+            return None, len(kept), excess
         kept = np.delete(kept, doomed, axis=0)
     if not len(kept):
-        return None, excess
+        return None, len(kept), excess
 
     low = kept.min(axis=0)
     high = kept.max(axis=0)
@@ -168,4 +170,4 @@ def cut_voxels(
             "score": float(share.sum()) - energy.sliver_cost * slivers - energy.loss_cost * lost,
         },
     )
-    return voxels, 0
+    return voxels, len(kept), 0

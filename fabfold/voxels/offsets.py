@@ -19,8 +19,16 @@ from numpy.typing import NDArray
 
 from fabfold.voxels.scan import box_counts
 
-__all__ = ["CellEnergy", "Offsets", "best_axis_offsets", "cell_energy", "optimise_offsets"]
+__all__ = [
+    "CellEnergy",
+    "Offsets",
+    "Planes",
+    "best_axis_offsets",
+    "cell_energy",
+    "optimise_offsets",
+]
 
+#: Ascending positions of the planes of x, y and z, in subvoxels.
 Planes = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
 
 

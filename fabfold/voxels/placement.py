@@ -74,7 +74,7 @@ def grid_rotations(count: int, seed: int, vertices: NDArray[np.float64]) -> NDAr
     """
     rng = np.random.default_rng([seed, 3])
     spread = vertices - vertices.mean(axis=0)
-    axes = np.linalg.eigh(spread.T @ spread)[1].T[::-1]
+    axes = np.linalg.eigh(np.einsum("ij,ik->jk", spread, spread))[1].T[::-1]
     # eigh leaves the signs open: largest entry of each axis positive, and right-handed.
     axes = axes * np.sign(np.take_along_axis(axes, np.abs(axes).argmax(1)[:, None], 1))
     axes[2] *= np.sign(np.linalg.det(axes))
@@ -190,18 +190,21 @@ def _mend(keep, fills, colour, surplus, below):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _judge(fills, energy, capacity, mend_below, keep, stack, labels):  # type: ignore[no-untyped-def]
     """Decide which cells stay; (score, kept, fill, slivers, lost, excess)."""
-    total = fills.sum()
+    share = fills.reshape(-1)
+    kept_share = keep.reshape(-1)
+    total = 0.0
     count = 0
-    for cell in range(fills.size):
-        keep.flat[cell] = fills.flat[cell] >= energy[0] and fills.flat[cell] > 0.0
-        count += keep.flat[cell]
-    if count > 2 * capacity[0]:
+    for cell in range(share.size):
+        total += share[cell]
+        kept_share[cell] = share[cell] >= energy[0] and share[cell] > 0.0
+        count += kept_share[cell]
+    if count > 1.5 * capacity[0] + 4:
         return -1e9, count, total, 0, 0.0, count - capacity[0]
     for _ in range(4):
         _keep_largest(keep, fills, stack, labels)
         even, odd, _kept = _overfull(keep, capacity[1], capacity[2])
-        if even + odd == 0:
-            break
+        if even + odd == 0 or even + odd > 4 + capacity[0] // 16:
+            break  # it fits, or is too far from it to be mended
         mended = _mend(keep, fills, 0, even, mend_below)
         mended = _mend(keep, fills, 1, odd, mend_below) or mended
         if not mended:
@@ -210,10 +213,10 @@ def _judge(fills, energy, capacity, mend_below, keep, stack, labels):  # type: i
     even, odd, kept = _overfull(keep, capacity[1], capacity[2])
     filled = 0.0
     slivers = 0
-    for cell in range(fills.size):
-        if keep.flat[cell]:
-            filled += fills.flat[cell]
-            slivers += fills.flat[cell] < energy[1]
+    for cell in range(share.size):
+        if kept_share[cell]:
+            filled += share[cell]
+            slivers += share[cell] < energy[1]
     lost = total - filled
     score = filled - energy[2] * slivers - energy[3] * lost
     return score, kept, filled, slivers, lost, even + odd
@@ -221,13 +224,13 @@ def _judge(fills, energy, capacity, mend_below, keep, stack, labels):  # type: i
 
 @njit(cache=True)
 def _rank(table, pitch, steps, energy, capacity, mend_below, excess_cost):  # type: ignore[no-untyped-def]
-    """Score and count of every translation of a grid of `pitch` subvoxels; (steps**3, 3)."""
+    """Verdict on every translation of a grid of `pitch` subvoxels; (steps**3, 4)."""
     size = np.array([table.shape[0] - 1, table.shape[1] - 1, table.shape[2] - 1])
     cells = np.zeros(3, dtype=np.int64)
     for axis in range(3):
         cells[axis] = math.ceil(size[axis] / pitch) + 1
     most = cells[0] * cells[1] * cells[2]
-    result = np.zeros((steps**3, 3))
+    result = np.zeros((steps**3, 4))
     keep = np.zeros((cells[0], cells[1], cells[2]), dtype=np.bool_)
     labels = np.zeros((cells[0], cells[1], cells[2]), dtype=np.int32)
     stack = np.zeros(most, dtype=np.int64)
@@ -248,6 +251,7 @@ def _rank(table, pitch, steps, energy, capacity, mend_below, excess_cost):  # ty
         result[row, 0] = verdict[0] - excess_cost * verdict[5]
         result[row, 1] = verdict[1]
         result[row, 2] = verdict[5]
+        result[row, 3] = verdict[4] / max(verdict[2] + verdict[4], 1e-300)
     return result
 
 
@@ -311,8 +315,8 @@ def rank_translations(
 
     Returns
     -------
-    (steps**3, 3) float64 array
-        Score, cells kept, and cells too many.
+    (steps**3, 4) float64 array
+        Score, cells kept, cells too many, and the share of the material that is lost.
     """
     return np.asarray(
         _rank(

@@ -1,223 +1,28 @@
-"""Find good placements of the voxel grid (paper section 3).
-
-Three rounds, each on fewer placements and with more care: every rotation is scanned coarsely once,
-and all pitches and translations are read off its summed volume table; the best are scanned at
-20 x 20 x 20 and get their planes moved; the best of those are warped, sampled and checked.
-"""
+"""Cut a solid into voxels that a template can hold (paper section 3)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fabfold.errors import NoVoxelsError, RecipeError
 from fabfold.lattice import Template
 from fabfold.progress import Progress, SilentProgress
 from fabfold.solid.model import Solid
-from fabfold.voxels.cut import Placement, cut_voxels
+from fabfold.voxels.cut import cut_voxels
 from fabfold.voxels.model import SUBDIVISION, Voxels
-from fabfold.voxels.offsets import CellEnergy, optimise_offsets
-from fabfold.voxels.placement import Capacity, grid_rotations, judge, rank_translations
-from fabfold.voxels.scan import box_counts, summed_volume
+from fabfold.voxels.offsets import CellEnergy
+from fabfold.voxels.placement import grid_rotations
+from fabfold.voxels.rounds import PITCHES, Ranked, Rounds, Tried
 
 __all__ = ["MAX_LOSS", "voxelize"]
 
 #: A voxelization that loses more than this share of the model's volume is no solution.
 MAX_LOSS = 0.10
-#: Subvoxels along a voxel in the first round.
-_COARSE = 10
-#: Subvoxels that a scan may hold; longer models are scanned more coarsely.
-_COARSE_LIMIT = 3_000_000
-_FINE_LIMIT = 40_000_000
-#: Pitches tried in the second round, in subvoxels of the pitch that the first round chose.
-_PITCHES = (17, 18, 19, 20, 21)
-
-
-@dataclass(frozen=True)
-class _Ranked:
-    score: float
-    rotation: int
-    pitch: float
-    origin: tuple[float, float, float]
-
-
-def _turned(
-    solid_vertices: NDArray[np.float64], rotation: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Rotated vertices, and their smallest and largest corner."""
-    vertices = solid_vertices @ rotation.T
-    return vertices, vertices.min(axis=0), vertices.max(axis=0)
-
-
-def _grid_shape(extent: NDArray[np.float64], side: float) -> tuple[int, int, int]:
-    x, y, z = np.maximum(np.ceil(extent / side).astype(int), 1).tolist()
-    return (x, y, z)
-
-
-class _Search:
-    """One run: the inputs, and the rounds in order."""
-
-    def __init__(
-        self,
-        solid: Solid,
-        template: Template,
-        energy: CellEnergy,
-        rotations: NDArray[np.float64],
-        limit: int,
-    ) -> None:
-        self.vertices = np.asarray(solid.vertices, dtype=np.float64)
-        self.faces = np.ascontiguousarray(solid.faces, dtype=np.int32)
-        self.volume = solid.volume
-        self.template = template
-        self.energy = energy
-        self.capacity = Capacity(len(template), template.colours)
-        self.rotations = rotations
-        self.limit = limit
-
-    def _coarse_table(self, rotation: int, side: float) -> tuple[NDArray[np.int32], float]:
-        """Summed volume table from the model's lower corner, and the side of its subvoxels."""
-        vertices, low, high = _turned(self.vertices, self.rotations[rotation])
-        extent = high - low
-        side = max(side, float(np.cbrt(np.prod(extent) / _COARSE_LIMIT)), float(extent.max()) / 512)
-        shape = _grid_shape(extent, side)
-        return summed_volume((vertices - low) / side, self.faces, shape), side
-
-    def pitch_range(self) -> tuple[float, float]:
-        """Smallest and largest pitch worth a look: all cells full, and 1 in 20 of them full."""
-        full = float(np.cbrt(self.volume / len(self.template)))
-        extent = max(float(np.ptp(self.vertices, axis=0).max()), 1e-300)
-        # A chain of n cells that touch face to face spans n cells in all, over the three axes.
-        return max(full, extent / (len(self.template) + 2)), 2.75 * full
-
-    def pilot_pitch(self, rotations: int = 9) -> float | None:
-        """A pitch that about fills the template: the median over the first rotations."""
-        low, high = self.pitch_range()
-        found = []
-        for index in range(min(rotations, len(self.rotations))):
-            table, side = self._coarse_table(index, low / 6)
-            pitch = max(high, low)
-            best = None
-            for _ in range(64):
-                rows = rank_translations(table, pitch / side, 2, self.energy, self.capacity)
-                fits = rows[rows[:, 2] == 0]
-                if len(fits) and fits[:, 0].max() > 0:
-                    best = pitch
-                if pitch < low or (best is not None and not len(fits)):
-                    break
-                pitch *= 0.97
-            if best is not None:
-                found.append(best)
-        return float(np.median(found)) if found else None
-
-    def first_round(
-        self,
-        pitches: NDArray[np.float64],
-        origin: NDArray[np.float64] | None,
-        progress: Progress,
-        steps: int = 4,
-    ) -> list[_Ranked]:
-        """Rank placements by regular grids; the best two of each rotation."""
-        ranked: list[_Ranked] = []
-        for index, rotation in enumerate(self.rotations):
-            if origin is not None:
-                ranked.extend(
-                    _Ranked(0.0, index, float(p), (origin[0], origin[1], origin[2]))
-                    for p in pitches
-                )
-                continue
-            table, side = self._coarse_table(index, float(pitches.min()) / _COARSE)
-            low = (self.vertices @ rotation.T).min(axis=0)
-            mine = []
-            for pitch in pitches:
-                rows = rank_translations(table, pitch / side, steps, self.energy, self.capacity)
-                for row in np.argsort(-rows[:, 0], kind="stable")[:2]:
-                    shift = np.array([row // steps**2, row // steps % steps, row % steps]) / steps
-                    # The first planes are at low - shift * pitch, half a cell before lattice 0.
-                    x, y, z = (low + (0.5 - shift) * pitch).tolist()
-                    mine.append(_Ranked(float(rows[row, 0]), index, float(pitch), (x, y, z)))
-            mine.sort(key=lambda item: -item.score)
-            ranked.extend(mine[:2])
-            if index % 16 == 15:
-                best = max(item.score for item in ranked)
-                progress.update(
-                    0.4 * (index + 1) / len(self.rotations),
-                    f"{index + 1} rotations of the grid; best score {best:.1f}",
-                )
-        ranked.sort(key=lambda item: -item.score)
-        return ranked
-
-    def second_round(
-        self, item: _Ranked, pitches: tuple[int, ...], fixed_origin: bool
-    ) -> list[tuple[float, int, Placement]]:
-        """Scan one placement finely and move its planes; (score, excess, placement) for each."""
-        rotation = self.rotations[item.rotation]
-        vertices, low, high = _turned(self.vertices, rotation)
-        side = item.pitch / SUBDIVISION
-        # The table begins on a plane of the grid, so that planes are at whole subvoxels.
-        corner = np.array(item.origin) - 0.5 * item.pitch
-        start = corner + np.floor((low - corner) / item.pitch - 1e-9) * item.pitch
-        shape = _grid_shape(high - start, side)
-        if int(np.prod(shape)) > _FINE_LIMIT:
-            return []
-        table = summed_volume((vertices - start) / side, self.faces, shape)
-        inside = np.floor((low - start) / side).astype(np.int64)
-        size = np.array(shape) - inside
-        results = []
-        for units in pitches:
-            shifts: list[NDArray[np.int64]] = []
-            if units == SUBDIVISION:
-                shifts.append(np.zeros(3, dtype=np.int64))
-            if not fixed_origin:
-                window = np.ascontiguousarray(table[inside[0] :, inside[1] :, inside[2] :])
-                rows = rank_translations(window, float(units), 4, self.energy, self.capacity)
-                for row in np.argsort(-rows[:, 0], kind="stable")[:2]:
-                    step = np.array([row // 16, row // 4 % 4, row % 4])
-                    shifts.append(inside - np.floor(step * units / 4 + 0.5).astype(np.int64))
-            for shift in shifts:
-                regular = []
-                for axis in range(3):
-                    count = -(-int(inside[axis] + size[axis] - shift[axis]) // units)
-                    planes = shift[axis] + units * np.arange(-1, count + 2)
-                    regular.append(planes.astype(np.int64))
-                limit = self.limit * units // SUBDIVISION
-                moved = optimise_offsets(
-                    table, (regular[0], regular[1], regular[2]), limit, self.energy
-                )
-                widths = [np.diff(planes).astype(float) for planes in moved.planes]
-                cell = widths[0][:, None, None] * widths[1][None, :, None] * widths[2]
-                verdict = judge(box_counts(table, moved.planes) / cell, self.energy, self.capacity)
-                pitch = units * side
-                first = np.array([-1, -1, -1], dtype=np.int64)
-                offsets = tuple(moved.offsets[axis] / units for axis in range(3))
-                results.append(
-                    (
-                        verdict.score,
-                        verdict.excess,
-                        Placement(
-                            rotation=rotation,
-                            origin=start + shift * side + 0.5 * pitch,
-                            pitch=pitch,
-                            first=first,
-                            offsets=(offsets[0], offsets[1], offsets[2]),
-                        ),
-                    )
-                )
-        return results
-
-
-def _checked_rotation(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    matrix = np.asarray(rotation, dtype=np.float64)
-    if (
-        matrix.shape != (3, 3)
-        or not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6)
-        or np.linalg.det(matrix) < 0
-    ):
-        raise RecipeError(
-            "the grid's rotation must be a 3 by 3 rotation matrix (orthonormal, determinant +1)"
-        )
-    return matrix
+#: Placements of the second round that are refined in the third.
+_REFINED = 6
+#: Two voxelizations whose sorted fills differ by less than this on average are the same.
+_SAME_FILL = 0.02
 
 
 def voxelize(
@@ -225,11 +30,11 @@ def voxelize(
     template: Template,
     *,
     seed: int = 0,
-    rotation: NDArray[np.float64] | None = None,
-    origin: NDArray[np.float64] | None = None,
+    rotation: ArrayLike | None = None,
+    origin: ArrayLike | None = None,
     pitch: float | None = None,
     placements: int = 200,
-    shortlist: int = 30,
+    shortlist: int = 40,
     results: int = 8,
     drop_below: float = 0.04,
     max_offset: int = 4,
@@ -247,131 +52,215 @@ def voxelize(
     rotation : (3, 3) array, optional
         From model axes to lattice axes, instead of searching.
     origin : (3,) array, optional
-        Point that is the centre of a cell: lattice axes, model units.
+        A point that is the centre of a cell: lattice axes, model units. Without `rotation`, the
+        lattice axes are the model's.
     pitch : float, optional
-        Side of a voxel in model units.
+        Side of a voxel in model units. With all three given, the grid is used as it is.
     placements : int
         Rotations to try.
     shortlist : int
-        Placements that get the full treatment.
+        Placements whose planes are moved.
     results : int
         Most voxelizations to return.
     drop_below : float
         Cells with less material than this share are dropped.
     max_offset : int
-        Subvoxels by which a plane may move, and a spacing change; 0 to 4.
+        Twentieths of a voxel by which a plane may move and a spacing change, 0 to 4.
     max_loss : float
-        Largest share of the volume that may be lost in dropped cells.
+        Largest share of the model's volume that may be lost in dropped cells.
     progress : Progress, optional
 
     Returns
     -------
     list of Voxels
-        Different ones, best first: most total fill, less 0.5 a sliver, less lost material.
+        Different ones, best first: most total fill, less 0.5 a sliver, less lost material. The
+        counts of both checkerboard colours fit the template, and the voxels hang together through
+        printed contacts.
 
     Raises
     ------
     RecipeError
         If a parameter cannot be used.
     NoVoxelsError
-        If no placement fits the template.
+        If no placement fits; the message has the best that was found.
 
     References
     ----------
     Zhou, Sueda, Matusik, Shamir: Boxelization, section 3.
     """
     progress = progress or SilentProgress()
-    if placements < 1 or shortlist < 1 or results < 1:
-        raise RecipeError("placements, shortlist and results must be at least 1")
-    if not 0.0 <= drop_below < 0.5:
-        raise RecipeError(f"drop_below must be from 0 to 0.5 of a cell, not {drop_below}")
-    if not 0 <= max_offset <= 4:
-        raise RecipeError(f"max_offset must be 0 to 4 subvoxels, not {max_offset}")
-    if pitch is not None and not (np.isfinite(pitch) and pitch > 0):
-        raise RecipeError(f"the grid's pitch must be greater than 0, not {pitch}")
+    _check_numbers(placements, shortlist, results, drop_below, max_offset, max_loss, pitch)
+    centre = None if origin is None else _checked_origin(origin)
     if rotation is not None:
         rotations = _checked_rotation(rotation)[None]
-    elif origin is not None:
+    elif centre is not None:
         rotations = np.eye(3)[None]
     else:
         rotations = grid_rotations(placements, seed, np.asarray(solid.vertices))
-    energy = CellEnergy(drop_below=drop_below)
-    search = _Search(solid, template, energy, rotations, max_offset)
-    pitches = _pitches(search, pitch)
-    ranked = search.first_round(
-        pitches, None if origin is None else np.asarray(origin, dtype=float), progress
-    )
+    rounds = Rounds(solid, template, rotations, CellEnergy(drop_below=drop_below), max_offset)
+    if not rounds.volume > 0:
+        raise NoVoxelsError("the model encloses no volume; repair it first")
+    _refuse_thin(rounds, pitch)
 
-    found: list[tuple[float, int, Placement]] = []
-    units = (SUBDIVISION,) if pitch is not None else _PITCHES
-    chosen = ranked if origin is not None else ranked[:shortlist]
-    for index, item in enumerate(chosen):
-        found.extend(search.second_round(item, units, origin is not None))
-        progress.update(
-            0.4 + 0.4 * (index + 1) / len(chosen), f"{index + 1} placements with planes moved"
+    pitches = np.array([pitch]) if pitch is not None else _pitches(rounds, max_loss, centre)
+    if centre is None:
+        ranked = rounds.first(pitches, progress)[:shortlist]
+    else:
+        x, y, z = centre.tolist()
+        ranked = [Ranked(0.0, 0, float(value), (x, y, z)) for value in pitches]
+    units = PITCHES if pitch is None and centre is None else (SUBDIVISION,)
+    found: list[Tried] = []
+    for index, item in enumerate(ranked):
+        found.extend(rounds.second(item, units, centre is not None))
+        progress.update(0.4 + 0.3 * (index + 1) / len(ranked), f"{index + 1} grids, planes moved")
+    found.sort(key=lambda tried: tried.order)
+    if pitch is None and centre is None:
+        for tried in _different(found)[:_REFINED]:
+            found.extend(rounds.third(tried))
+        found.sort(key=lambda tried: tried.order)
+        progress.update(0.8, "pitch refined")
+    return _finish(rounds, found, results, max_loss, progress)
+
+
+def _check_numbers(
+    placements: int,
+    shortlist: int,
+    results: int,
+    drop_below: float,
+    max_offset: int,
+    max_loss: float,
+    pitch: float | None,
+) -> None:
+    if placements < 1 or shortlist < 1 or results < 1:
+        raise RecipeError("placements, shortlist and results must be at least 1")
+    if not 0.0 <= drop_below < 0.5:
+        raise RecipeError(f"drop_below must be from 0 to under 0.5 of a cell, not {drop_below}")
+    if not 0 <= max_offset <= 4:
+        raise RecipeError(f"max_offset must be 0 to 4 twentieths of a voxel, not {max_offset}")
+    if not 0.0 <= max_loss <= 1.0:
+        raise RecipeError(f"max_loss must be a share from 0 to 1, not {max_loss}")
+    if pitch is not None and not (np.isfinite(pitch) and pitch > 0):
+        raise RecipeError(f"the grid's pitch must be greater than 0, not {pitch}")
+
+
+def _checked_rotation(rotation: ArrayLike) -> NDArray[np.float64]:
+    matrix = np.asarray(rotation, dtype=np.float64)
+    if (
+        matrix.shape != (3, 3)
+        or not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6)
+        or np.linalg.det(matrix) < 0
+    ):
+        raise RecipeError(
+            "the grid's rotation must be a 3 by 3 rotation matrix: orthonormal, determinant +1"
         )
-    found.sort(key=lambda entry: (entry[1] > 0, -entry[0]))
-    return _finish(search, found, results, max_loss, progress)
+    return matrix
 
 
-def _pitches(search: _Search, pitch: float | None) -> NDArray[np.float64]:
-    if pitch is not None:
-        return np.array([float(pitch)])
-    low, high = search.pitch_range()
-    if search.volume / low**3 < 1.0:
+def _checked_origin(origin: ArrayLike) -> NDArray[np.float64]:
+    point = np.asarray(origin, dtype=np.float64)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise RecipeError("the grid's origin must be three finite numbers")
+    return point
+
+
+def _refuse_thin(rounds: Rounds, pitch: float | None) -> None:
+    """End at once where all material together cannot fill one voxel."""
+    low = rounds.pitch_range()[0] if pitch is None else pitch
+    filled = rounds.volume / low**3
+    if filled < 1.0:
         raise NoVoxelsError(
-            f"the model is too thin: cut into {len(search.template)} voxels, all of its material "
-            f"fills {search.volume / low**3:.2g} of a single voxel; thicken the model"
+            f"with voxels of {low:.4g} model units"
+            + (" (the smallest that make sense)" if pitch is None else "")
+            + f", all of the model together fills {filled:.2g} of one voxel: "
+            + ("the model is too thin to be folded; thicken it" if pitch is None else "lower pitch")
         )
-    pilot = search.pilot_pitch()
+    if rounds.extent / low > rounds.capacity.cells + 2:
+        raise NoVoxelsError(
+            f"with voxels of {low:.4g} model units the model is {rounds.extent / low:.0f} voxels "
+            f"long, and template {rounds.template.name} has only {rounds.capacity.cells}: "
+            "raise pitch, or use a larger template"
+        )
+
+
+def _pitches(
+    rounds: Rounds, max_loss: float, centre: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Pitches worth trying, from a quick look at a few rotations."""
+    pilot, nearest = rounds.pilot(max_loss)
     if pilot is None:
+        low, high = rounds.pitch_range()
         raise NoVoxelsError(
-            f"no voxel size from {low:.4g} to {max(low, high):.4g} model units gives cells with "
-            f"enough material that fit template {search.template.name} "
-            f"({len(search.template)} cells): its parts are too thin; thicken the model, "
-            "lower drop_below, or use a larger template"
+            f"no voxel size from {low:.4g} to {high:.4g} model units suits template "
+            f"{rounds.template.name} ({rounds.capacity.cells} cells): the best of a first look is "
+            f"{nearest}. The model is too thin for this template: thicken it, lower drop_below, "
+            "or use a larger template"
         )
-    return np.asarray(pilot * 1.03 ** np.arange(-5, 3))
+    if centre is None:
+        return np.asarray(pilot * 1.03 ** np.arange(-5, 3))
+    return np.asarray(pilot * 1.01 ** np.arange(-18, 13))
+
+
+def _different(found: list[Tried]) -> list[Tried]:
+    """Those that fit, one for each rotation."""
+    seen: set[int] = set()
+    best = []
+    for tried in found:
+        if tried.verdict.excess == 0 and tried.rotation not in seen:
+            seen.add(tried.rotation)
+            best.append(tried)
+    return best
+
+
+def _is_new(voxels: Voxels, others: list[Voxels]) -> bool:
+    """Whether no other has (nearly) the same cells, turned or not."""
+    fills = np.sort(voxels.fill)
+    return all(
+        len(other) != len(voxels) or np.abs(np.sort(other.fill) - fills).mean() >= _SAME_FILL
+        for other in others
+    )
 
 
 def _finish(
-    search: _Search,
-    found: list[tuple[float, int, Placement]],
-    results: int,
-    max_loss: float,
-    progress: Progress,
+    rounds: Rounds, found: list[Tried], results: int, max_loss: float, progress: Progress
 ) -> list[Voxels]:
     """Cut the best placements, check them, and keep different ones."""
     done: list[Voxels] = []
-    tried = 0
-    nearest: str = ""
-    for _score, _excess, placement in found:
-        if len(done) >= results or tried >= 3 * results:
+    used: dict[int, int] = {}
+    seen: set[tuple[int, int, float]] = set()
+    nearest = ""
+    attempts = 0
+    for tried in found:
+        if len(done) >= results or attempts >= 3 * results:
             break
-        same = [v for v in done if np.array_equal(v.rotation, placement.rotation)]
-        if len(same) >= 2 or any(abs(v.pitch / placement.pitch - 1) < 0.02 for v in same):
+        if used.get(tried.rotation, 0) >= 2:
             continue
-        tried += 1
-        voxels, excess = cut_voxels(
-            search.vertices, search.faces, placement, search.energy, search.capacity
+        # Placements that differ by nothing that counts come out of the rounds many times over.
+        key = (tried.rotation, tried.verdict.kept, round(tried.verdict.fill, 1))
+        if key in seen:
+            continue
+        seen.add(key)
+        attempts += 1
+        voxels, kept, excess = cut_voxels(
+            rounds.vertices, rounds.faces, tried.placement, rounds.energy, rounds.capacity
         )
         if voxels is None:
-            nearest = nearest or f"{excess} cells too many for its colours"
+            nearest = nearest or f"{kept} cells, {excess} of them too many"
         elif voxels.lost_volume > max_loss:
             nearest = nearest or (
-                f"{len(voxels)} cells, with {100 * voxels.lost_volume:.0f} % of the volume lost "
+                f"{kept} cells, with {100 * voxels.lost_volume:.0f} % of the volume lost "
                 f"(allowed: {100 * max_loss:.0f} %)"
             )
-        else:
+        elif _is_new(voxels, done):
             done.append(voxels)
+            used[tried.rotation] = used.get(tried.rotation, 0) + 1
             progress.update(0.8 + 0.2 * len(done) / results, f"{len(voxels)} voxels")
     if not done:
-        even, odd = search.capacity.colours
+        even, odd = rounds.capacity.colours
         raise NoVoxelsError(
-            f"no placement of the grid fits template {search.template.name} "
-            f"({even} + {odd} cells by checkerboard colour); the best had "
-            f"{nearest or 'no cell with enough material'}: try another seed, more placements, "
-            "a larger pitch or template, or a thicker model"
+            f"no placement of the grid fits template {rounds.template.name} ({even} + {odd} cells "
+            f"by checkerboard colour); the best has {nearest or 'no cell with enough material'}. "
+            "Try a larger pitch or template, another seed, more placements, or a thicker model"
         )
     done.sort(key=lambda voxels: -voxels.energy["score"])
+    progress.update(1.0, f"{len(done)} voxelizations")
     return done
