@@ -116,7 +116,7 @@ def load_sample(name: str) -> Solid:
     known = sample(name)
     part = build_sample(name)
     size = part.bounding_box().size
-    vertices, faces = tessellate(part, max(size.X, size.Y, size.Z), chord=0.001, angle=0.25)
+    vertices, faces = tessellate(part, max(size.X, size.Y, size.Z), chord=0.0005, angle=0.2)
     digest = hashlib.sha256(f"sample:{known.name}:{known.version}".encode()).hexdigest()
     # The kernel's last digits may differ between processors; a model is no finer than this.
     solid = solid_from_mesh(known.name, RawMesh(np.round(vertices, 9), faces), digest)

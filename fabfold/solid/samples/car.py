@@ -14,7 +14,7 @@ WHEEL_RADIUS = 8.6
 
 def draw() -> Any:
     """Draw the car: 10 mm a voxel, looking along +x."""
-    from build123d import Axis, Box, Plane, Polyline, Pos, Rectangle, extrude, fillet, make_face
+    from build123d import Axis, Box, Plane, Polyline, Pos, extrude, fillet, make_face
 
     side = make_face(
         Polyline(
@@ -43,32 +43,27 @@ def draw() -> Any:
         well = cylinder_y((x, 14, 8.6), WHEEL_RADIUS + 1.0, 4.0)
         tyre = cylinder_y((x, 12.2, 8.6), WHEEL_RADIUS, 8.4, 1.6)
         dish = cylinder_y((x, 16.6, 8.6), WHEEL_RADIUS - 3.0, 1.6)
-        hub = ellipsoid((x, 15.4, 8.6), (2.8, 2.0, 2.8))
+        hub = ellipsoid((x, 15.0, 8.6), (2.8, 2.0, 2.8))
         for one, hole, wheel, cut, cap in zip(
             both_sides(arch), both_sides(well), both_sides(tyre), both_sides(dish), both_sides(hub),
             strict=True,
         ):
             parts += [one - hole, wheel - cut, cap]
-    parts += both_sides(ellipsoid((29.5, 8.5, 15.5), (2.8, 3.1, 3.1)))
-    parts += both_sides(ellipsoid((-30, 9, 15.5), (1.8, 2.4, 2.0)))
-    for x in (31.0, -31.0):
-        bend = 1.8 if x < 0 else -1.8
-        parts.append(
-            limb([(x + bend, -12.5, 8.5), (x, 0, 8.5), (x + bend, 12.5, 8.5)], [2.3, 2.3, 2.3])
-        )
+    parts += both_sides(ellipsoid((28.6, 9.0, 15.2), (3.4, 3.4, 3.4)))
+    parts += both_sides(ellipsoid((-29.2, 9.5, 15.5), (2.4, 2.4, 2.4)))
+    for x in (30.4, -30.4):
+        parts.append(limb([(x, -12.0, 9.2), (x, 12.0, 9.2)], [2.9, 2.9]))
     floor = Pos(0, 0, -20) * Box(200, 200, 40)
-    del Rectangle
     return fuse([fuse(parts) - floor])
 
 
 def _cabin(inset: float) -> Any:
     """The cabin, smaller by `inset` on all sides: what the windows are sunk into."""
-    from build123d import Axis, Plane, Rectangle, extrude, fillet, loft, Pos
+    from build123d import Axis, Pos, Rectangle, fillet, loft
 
     base = Pos(-3, 0, 19) * Rectangle(42 - 2 * inset, 25 - 2 * inset)
     top = Pos(-4, 0, 34 - inset) * Rectangle(22 - 2 * inset, 18.5 - 2 * inset)
     body = loft([base, top])
-    del Plane, extrude
     rims = body.edges() - body.faces().sort_by(Axis.Z)[0].edges()
     return fillet(rims, 3.4 - inset)
 

@@ -5,25 +5,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-__all__ = ["both_sides", "cylinder_y", "ellipsoid", "fuse", "limb", "spheroid"]
+__all__ = ["both_sides", "cylinder_y", "ellipsoid", "fuse", "limb"]
 
 Triple = tuple[float, float, float]
 
 
 def ellipsoid(centre: Triple, radii: Triple, turn: Triple = (0, 0, 0)) -> Any:
-    """Ellipsoid with any three radii, turned by Euler angles (degrees, intrinsic XYZ)."""
-    from build123d import Location, Sphere, scale
+    """Ellipsoid with three radii, turned by Euler angles (degrees, intrinsic XYZ).
 
-    body = scale(Sphere(1.0), by=radii)
-    return Location(centre, turn) * body
+    With two equal radii it is a surface of revolution, with three a sphere: the kernel unites
+    these several times faster than general ellipsoids.
+    """
+    from build123d import Axis, Ellipse, Location, Plane, Pos, Rectangle, Rot, Sphere
+    from build123d import revolve, scale
 
-
-def spheroid(centre: Triple, radius: float, half_length: float, turn: Triple = (0, 0, 0)) -> Any:
-    """Ellipsoid of revolution about its local z, an exact surface of revolution."""
-    from build123d import Axis, Ellipse, Location, Plane, Pos, Rectangle, revolve
-
-    half = Ellipse(radius, half_length) & Pos(radius, 0) * Rectangle(2 * radius, 3 * half_length)
-    return Location(centre, turn) * revolve(Plane.XZ * half, Axis.Z)
+    x, y, z = radii
+    place = Location(centre, turn)
+    if x == y == z:
+        return place * Sphere(x)
+    if len({x, y, z}) == 3:
+        return place * scale(Sphere(1.0), by=radii)
+    radius, half, upright = (y, x, Rot(0, 90, 0)) if y == z else (x, y, Rot(90, 0, 0))
+    if x == y:
+        radius, half, upright = x, z, Rot(0, 0, 0)
+    outline = Ellipse(radius, half) & Pos(radius, 0) * Rectangle(2 * radius, 3 * half)
+    return place * upright * revolve(Plane.XZ * outline, Axis.Z)
 
 
 def limb(points: Sequence[Triple], radii: Sequence[float], squash: float = 1.0) -> Any:
