@@ -8,7 +8,14 @@
     ) -> HingeMeshes(parent_half, child_half, parent_carve, child_carve,
                      barrel_radius_mm, pin_radius_mm, knuckles, reach_mm)
 
-    each of the four: MeshPart(vertices (v, 3) float64 in mm, faces (f, 3) int32)
+    double_hinge_meshes(
+        voxel_mm, clearance_mm, first="+y", second="-y", turns=(180, 180), *,
+        barrel_radius_mm=None, pin_radius_mm=None, knuckles=None, plate_mm=2.0,
+        gap_mm=None, bracket_mm=None, margin_mm=None, wall_mm=0.8, segments=64,
+    ) -> DoubleHingeMeshes(parent_half, link, child_half, parent_carve, child_carve,
+                           barrel_radius_mm, pin_radius_mm, knuckles, reach_mm)
+
+    each piece: MeshPart(vertices (v, 3) float64 in mm, faces (f, 3) int32)
 
 Use it as ``body - carve + half`` on each of the two bodies, in that order; nothing needs to be
 subtracted after.
@@ -17,6 +24,15 @@ Frame: the axis is z through the origin and the edge is centred on it (z from -v
 At angle 0 the parent's material is in the quadrant x < 0, y < 0 and the child's in x > 0, y < 0:
 x points from the parent's cell to the child's, y outwards from the shared face at the hinged edge.
 A positive turn of the child about +z takes it through x > 0, y > 0 to x < 0, y > 0 at 180°.
+
+Frame of a double hinge: the face that both cells share is |y|, |z| ≤ voxel/2 of the plane x = 0, the
+parent's cell lies at x < 0 and the child's at x > 0. `first` and `second` name the edge of that face
+on which the parent-link and the link-child axis runs: "+y", "-y", "+z" or "-z". A positive first
+angle turns link and child about the direction ``x × edge``, a positive second angle the child about
+``x × edge`` of its own edge: both carry the child away from the face and around the edge.
+`link` is a body of its own. The carves hold the pockets for the link plate at 0 and, for a turn of
+270, where it comes to lie on the other face; no material of the bodies may lie within gap/2 of the
+faces of their cells.
 
 The meshes are built from polygons of `segments` corners that lie inside the true circle on barrels
 and cones and outside it on grooves and recesses, so a gap between meshes is never below the exact
@@ -36,12 +52,22 @@ from .clearance import Clearance
 from .leaf import Bracket
 from .pins import ConePin
 from .plan import HalfPlan, SingleSpec, default_pin_radius, default_radii, plan_single
+from .plan_double import DoubleSpec, plan_double
 from .shapes import Moved, Prism, Shape
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-__all__ = ["HingeMeshes", "MeshPart", "half_of", "part_of", "single_hinge_meshes", "solid_of"]
+__all__ = [
+    "DoubleHingeMeshes",
+    "HingeMeshes",
+    "MeshPart",
+    "double_hinge_meshes",
+    "half_of",
+    "part_of",
+    "single_hinge_meshes",
+    "solid_of",
+]
 
 
 class MeshPart(NamedTuple):
@@ -78,6 +104,35 @@ class HingeMeshes(NamedTuple):
     """
 
     parent_half: MeshPart
+    child_half: MeshPart
+    parent_carve: MeshPart
+    child_carve: MeshPart
+    barrel_radius_mm: float
+    pin_radius_mm: float
+    knuckles: int
+    reach_mm: float
+
+
+class DoubleHingeMeshes(NamedTuple):
+    """The five pieces of one double hinge, and the sizes that were used.
+
+    Attributes
+    ----------
+    parent_half, child_half : MeshPart
+        To add to each body after its carve was subtracted. One connected piece each.
+    link : MeshPart
+        The link plate with its knuckles: a body of its own.
+    parent_carve, child_carve : MeshPart
+        To subtract from each body first.
+    barrel_radius_mm, pin_radius_mm : float
+    knuckles : int
+        On each axis; of both together when they share an edge.
+    reach_mm : float
+        Radius of the groove that a barrel needs in any other body.
+    """
+
+    parent_half: MeshPart
+    link: MeshPart
     child_half: MeshPart
     parent_carve: MeshPart
     child_carve: MeshPart
@@ -244,5 +299,113 @@ def _single(
         barrel,
         pin,
         knuckles,
+        reach,
+    )
+
+
+def double_hinge_meshes(
+    voxel_mm: float,
+    clearance_mm: float,
+    first: str = "+y",
+    second: str = "-y",
+    turns: tuple[float, float] = (180.0, 180.0),
+    **options: Any,
+) -> DoubleHingeMeshes:
+    """Build the five pieces of a cone-pinned double hinge for the face between two voxels.
+
+    Parameters
+    ----------
+    voxel_mm : float
+        Side of the face.
+    clearance_mm : float
+        Normal clearance in the hinge, and room around the link plate.
+    first, second : {"+y", "-y", "+z", "-z"}
+        Edges of the two axes.
+    turns : (float, float)
+        How far each axis turns: 90, 180 or 270 degrees.
+    barrel_radius_mm, pin_radius_mm, gap_mm, bracket_mm, margin_mm, wall_mm, segments
+        As for :func:`single_hinge_meshes`.
+    knuckles : int, optional
+        On each axis, 3 by default; 5 when both share an edge.
+    plate_mm : float
+        Thickness of the link plate.
+
+    Returns
+    -------
+    DoubleHingeMeshes
+        The work is cached by the arguments; the arrays are the caller's own copies.
+
+    Raises
+    ------
+    FitError
+        If the hinge cannot be printed at this size, naming the rule and what to change.
+    HingeError
+        If an edge or a turn is unknown.
+    """
+    pair = (float(turns[0]), float(turns[1]))
+    made = _double(float(voxel_mm), float(clearance_mm), first, second, pair, **options)
+    return made._replace(
+        parent_half=made.parent_half.copied(),
+        link=made.link.copied(),
+        child_half=made.child_half.copied(),
+        parent_carve=made.parent_carve.copied(),
+        child_carve=made.child_carve.copied(),
+    )
+
+
+@lru_cache(maxsize=256)
+def _double(
+    voxel_mm: float,
+    clearance_mm: float,
+    first: str,
+    second: str,
+    turns: tuple[float, float],
+    *,
+    barrel_radius_mm: float | None = None,
+    pin_radius_mm: float | None = None,
+    knuckles: int | None = None,
+    plate_mm: float = 2.0,
+    gap_mm: float | None = None,
+    bracket_mm: float | None = None,
+    margin_mm: float | None = None,
+    wall_mm: float = 0.8,
+    segments: int = 64,
+) -> DoubleHingeMeshes:
+    room = Clearance(clearance_mm)
+    count = knuckles or (5 if first == second else 3)
+    barrel = barrel_radius_mm
+    if barrel is None:
+        barrel, _ = default_radii(voxel_mm, room, wall_mm, count, margin_mm, widest=5.0)
+    pin = default_pin_radius(barrel, room, wall_mm) if pin_radius_mm is None else pin_radius_mm
+    reach = barrel + room.radial
+    bracket = max(0.15 * voxel_mm, reach + 1.2) if bracket_mm is None else bracket_mm
+    spec = DoubleSpec.read(
+        voxel_mm,
+        first=first,
+        second=second,
+        turns=turns,
+        knuckles=count,
+        radius=barrel,
+        pin=ConePin(pin),
+        clearance=room,
+        plate=plate_mm,
+        bracket=Bracket(bracket),
+        gap=gap_mm,
+        margin=margin_mm,
+        wall=wall_mm,
+    )
+    plan = plan_double(spec)
+    parent, parent_carve = half_of(plan.parent, segments)
+    child, child_carve = half_of(plan.child, segments)
+    link, _ = half_of(plan.link, segments)
+    return DoubleHingeMeshes(
+        part_of(parent),
+        part_of(link),
+        part_of(child),
+        part_of(parent_carve),
+        part_of(child_carve),
+        barrel,
+        pin,
+        count,
         reach,
     )
