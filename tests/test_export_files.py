@@ -127,15 +127,16 @@ def _points(mesh_object) -> np.ndarray:
     return np.array([list(p.Coordinates) for p in mesh_object.GetVertices()])
 
 
-@pytest.mark.parametrize("layout", ["assembly", "apart"])
+@pytest.mark.parametrize("layout", ["kit", "assembly", "apart"])
 def test_3mf_one_named_coloured_object_a_body(tmp_path, kit, layout):
     path = tmp_path / "kit.3mf"
     colours = body_colours(kit.tree)
     write_3mf(path, kit.joinery, title="Row", colours=colours, layout=layout)
     model, objects = _read_3mf(path)
-    assert [o.GetName() for o in objects] == [b.name for b in kit.joinery.bodies]
-    assert _items(model) == (1 if layout == "assembly" else 4)
-    for found, body, colour in zip(objects, kit.joinery.bodies, colours, strict=True):
+    names = [b.name for b in kit.joinery.bodies]
+    assert [o.GetName() for o in objects] == ([*names, "Row"] if layout == "kit" else names)
+    assert _items(model) == (4 if layout == "apart" else 1)
+    for found, body, colour in zip(objects, kit.joinery.bodies, colours, strict=False):
         assert found.IsManifoldAndOriented()
         points = _points(found)
         assert points.min(axis=0) == pytest.approx(body.vertices.min(axis=0), abs=1e-4)
@@ -148,14 +149,15 @@ def test_3mf_one_named_coloured_object_a_body(tmp_path, kit, layout):
     assert list(box.MinCoordinate) == pytest.approx([0, 0, 0], abs=1e-3)
 
 
-def test_3mf_merged_names_the_parts_for_prusaslicer(tmp_path, kit):
+def test_3mf_kit_names_the_parts_for_prusaslicer(tmp_path, kit):
     path = tmp_path / "kit.3mf"
-    write_3mf(path, kit.joinery, title='Row <of "4">', layout="merged")
-    _, (whole,) = _read_3mf(path)
+    write_3mf(path, kit.joinery, title='Row <of "4">', thumbnail=b"png")
+    _, (*_, whole) = _read_3mf(path)
     assert whole.IsManifoldAndOriented()
     import xml.etree.ElementTree as ET
 
     config = ET.fromstring(zipfile.ZipFile(path).read("Metadata/Slic3r_PE_model.config"))
+    assert zipfile.ZipFile(path).read("Metadata/thumbnail.png") == b"png"
     (entry,) = config.findall("object")
     assert int(entry.get("id")) == whole.GetModelResourceID()
     assert entry.find("metadata").get("value") == 'Row <of "4">'
@@ -415,7 +417,7 @@ tree = row_tree()
 joinery = row_joinery(tree)
 write_stl(folder / "bodies", joinery)
 write_combined_stl(folder / "kit.stl", joinery)
-for layout in ("assembly", "merged", "apart"):
+for layout in ("kit", "assembly", "apart"):
     write_3mf(folder / f"{layout}.3mf", joinery, title="Row", metadata={"seed": "1"}, layout=layout)
 write_glb(folder / "fold.glb", joinery, tree, row_motion(tree))
 """

@@ -3,15 +3,17 @@
 No one arrangement of objects is read as *one kit of named parts* by every slicer, so there are
 three, called layouts:
 
+``"kit"``
+    One mesh object that holds every body is what gets printed. The bodies' triangle ranges and
+    names stand in ``Metadata/Slic3r_PE_model.config``, so PrusaSlicer and SuperSlicer open it as
+    one object of named parts, and any other slicer as one coloured object: nothing can be moved
+    apart by mistake. Each body is in the file as an object of its own too, named and coloured,
+    of type "other" and outside the build, for programs that look for parts.
 ``"assembly"``
     One mesh object a body and one build item that holds them all as components, in their places.
-    This is how the 3MF core specification groups parts; Bambu Studio, OrcaSlicer, Cura and
-    Windows open it as one object of parts.
-``"merged"``
-    One mesh object that holds every body, with the bodies' triangle ranges and names in
-    ``Metadata/Slic3r_PE_model.config``. PrusaSlicer and SuperSlicer open it as one object of named
-    parts; they would take the components of an assembly apart into separate objects, most of them
-    afloat.
+    This is how the 3MF core specification groups parts; Bambu Studio and OrcaSlicer open it as one
+    object of named parts. PrusaSlicer does not: it takes the components apart into separate
+    objects, and refuses those that do not touch the plate.
 ``"apart"``
     One mesh object and one build item a body: for bodies laid out on a plate.
 
@@ -42,7 +44,7 @@ from fabfold.joinery.model import Joinery
 
 __all__ = ["Layout", "posed", "write_3mf"]
 
-Layout = Literal["assembly", "merged", "apart"]
+Layout = Literal["kit", "assembly", "apart"]
 
 #: Metadata names that the core specification knows; all others get a name space of their own.
 _KNOWN = frozenset(
@@ -94,7 +96,8 @@ def write_3mf(
     title: str,
     metadata: Mapping[str, str] | None = None,
     colours: NDArray[np.uint8] | None = None,
-    layout: Layout = "assembly",
+    layout: Layout = "kit",
+    thumbnail: bytes | None = None,
 ) -> None:
     """Write the bodies as one 3MF file; the same input gives the same bytes.
 
@@ -111,8 +114,10 @@ def write_3mf(
         space ``urn:fabfold:kit``. ``Application`` is ``fabfold`` unless given.
     colours : (b, 3) uint8 array, optional
         sRGB, one a body.
-    layout : {"assembly", "merged", "apart"}
+    layout : {"kit", "assembly", "apart"}
         How the bodies are grouped; see the module's description.
+    thumbnail : bytes, optional
+        A PNG that file managers and slicers show for the file.
 
     Raises
     ------
@@ -146,28 +151,30 @@ def write_3mf(
     lowest = np.min([vertices.min(axis=0) for vertices, _ in meshes], axis=0)
     place = _translation(lib3mf, -np.round(lowest.astype(float), _DECIMALS))
     model.SetBuildUUID(str(uuid.uuid5(space, "build")))
-    if layout == "merged":
-        whole = _add_merged(lib3mf, model, title, meshes, materials.GetResourceID(), paints)
-        whole.SetUUID(str(uuid.uuid5(space, "kit")))
+    bodies = []
+    for name, mesh, paint in zip(names, meshes, paints, strict=True):
+        body = _add_mesh(lib3mf, model, name, mesh)
+        body.SetObjectLevelProperty(materials.GetResourceID(), paint)
+        body.SetUUID(str(uuid.uuid5(space, name)))
+        bodies.append(body)
+    tops, settings = bodies, {}
+    if layout == "kit":
+        for body in bodies:
+            # PrusaSlicer fails on objects of type "model" that are not built.
+            body.SetType(lib3mf.ObjectType.Other)
+        whole = _add_whole(lib3mf, model, title, meshes, materials.GetResourceID(), paints)
         settings = {"Slic3r_PE_model.config": _prusa_config(whole, title, names, meshes)}
         tops = [whole]
-    else:
-        tops = []
-        for name, mesh, paint in zip(names, meshes, paints, strict=True):
-            body = _add_mesh(lib3mf, model, name, mesh)
-            body.SetObjectLevelProperty(materials.GetResourceID(), paint)
-            body.SetUUID(str(uuid.uuid5(space, name)))
-            tops.append(body)
-        settings = {}
-        if layout == "assembly":
-            whole = model.AddComponentsObject()
-            whole.SetName(title)
-            whole.SetUUID(str(uuid.uuid5(space, "kit")))
-            for name, body in zip(names, tops, strict=True):
-                component = whole.AddComponent(body, wrapper.GetIdentityTransform())
-                component.SetUUID(str(uuid.uuid5(space, f"component {name}")))
-            settings = {"model_settings.config": _bambu_config(whole, title, names, tops)}
-            tops = [whole]
+    elif layout == "assembly":
+        whole = model.AddComponentsObject()
+        whole.SetName(title)
+        for name, body in zip(names, bodies, strict=True):
+            component = whole.AddComponent(body, wrapper.GetIdentityTransform())
+            component.SetUUID(str(uuid.uuid5(space, f"component {name}")))
+        settings = {"model_settings.config": _bambu_config(whole, title, names, bodies)}
+        tops = [whole]
+    if layout != "apart":
+        tops[0].SetUUID(str(uuid.uuid5(space, "kit")))
     for index, top in enumerate(tops):
         item = model.AddBuildItem(top, place)
         item.SetUUID(str(uuid.uuid5(space, f"item {index}")))
@@ -176,6 +183,8 @@ def write_3mf(
     for file_name, text in settings.items():
         attachment = model.AddAttachment(f"/Metadata/{file_name}", _RELATIONSHIP)
         attachment.ReadFromBuffer(text.encode("utf-8"))
+    if thumbnail is not None:
+        model.CreatePackageThumbnailAttachment().ReadFromBuffer(thumbnail)
     writer = model.QueryWriter("3mf")
     writer.SetDecimalPrecision(_DECIMALS)
     with replacing(path) as temporary:
@@ -224,7 +233,7 @@ def _add_mesh(lib3mf: Any, model: Any, name: str, mesh: _Mesh) -> Any:
     return target
 
 
-def _add_merged(
+def _add_whole(
     lib3mf: Any, model: Any, title: str, meshes: list[_Mesh], materials: int, paints: list[int]
 ) -> Any:
     starts = np.cumsum([0] + [len(vertices) for vertices, _ in meshes])
