@@ -1,0 +1,130 @@
+"""Printer and material profiles: small data files with the limits that checks hold bodies to."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from fabfold.errors import RecipeError
+
+__all__ = ["DEFAULT_PROFILE", "Profile", "load_profile", "profile_names", "profiles_folder"]
+
+#: A kit is printed closed, as the model, with a gap under every face. Powder carries those faces
+#: and blows out of the gaps; Multi Jet Fusion does so with the narrower gap of the two nylon
+#: processes, every printing service offers it, and nylon bears folding.
+DEFAULT_PROFILE = "mjf-pa12"
+
+Length = Annotated[float, Field(gt=0.0, le=1000.0)]
+
+
+class Profile(BaseModel):
+    """Limits of one printer and material, in mm and degrees.
+
+    Attributes
+    ----------
+    name, description : str
+    process, material : str
+        Such as ``"FDM"`` and ``"PLA"``.
+    nozzle_mm : float or None
+        Of extruding printers.
+    layer_mm : float or None
+    clearance_mm : float
+        Gap between bodies and in hinges that a kit is made with unless its recipe says otherwise.
+    min_gap_mm : float
+        Smallest gap that stays open in the print.
+    min_wall_mm : float
+        Thinnest wall that prints.
+    max_overhang_deg : float or None
+        Steepest overhang from the vertical that prints without support; None where no support is
+        needed.
+    in_place : bool
+        Whether the closed kit can be printed as one object: the process leaves open the gap under
+        every face.
+    bed_mm : tuple of three floats or None
+        Build volume along x, y and z.
+    sources : tuple of str
+        Where the figures come from.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: Annotated[str, Field(min_length=1, max_length=80)]
+    description: Annotated[str, Field(max_length=400)] = ""
+    process: Annotated[str, Field(min_length=1, max_length=40)]
+    material: Annotated[str, Field(max_length=80)] = ""
+    nozzle_mm: Length | None = None
+    layer_mm: Length | None = None
+    clearance_mm: Annotated[float, Field(gt=0.0, le=5.0)]
+    min_gap_mm: Annotated[float, Field(gt=0.0, le=5.0)]
+    min_wall_mm: Annotated[float, Field(gt=0.0, le=20.0)]
+    max_overhang_deg: Annotated[float, Field(ge=0.0, le=90.0)] | None = None
+    in_place: bool
+    bed_mm: tuple[Length, Length, Length] | None = None
+    sources: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _gap_below_clearance(self) -> Profile:
+        if self.min_gap_mm >= self.clearance_mm:
+            raise ValueError(
+                f"min_gap_mm ({self.min_gap_mm:g}) must be below clearance_mm "
+                f"({self.clearance_mm:g}): the printer needs some of the gap for itself"
+            )
+        return self
+
+
+def profiles_folder() -> Path:
+    """Folder that holds the profile files, in a checkout as in an installed wheel."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "_data" / "prints"
+    return installed if installed.is_dir() else package.parent / "prints"
+
+
+def profile_names() -> list[str]:
+    """Names of the profiles that come with fabfold."""
+    return sorted(path.stem for path in profiles_folder().glob("*.toml"))
+
+
+def load_profile(name: str) -> Profile:
+    """Profile by the name of a shipped one, or by the path of a ``.toml`` file.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``"mjf-pa12"`` or ``"my-printer.toml"``.
+
+    Raises
+    ------
+    RecipeError
+        If there is no such profile (the known names are listed), or the file is not a profile
+        (every wrong field is listed).
+
+    Examples
+    --------
+    >>> load_profile("mjf-pa12").process
+    'MJF'
+    """
+    known = profile_names()
+    if name in known:
+        path = profiles_folder() / f"{name}.toml"
+    else:
+        path = Path(name)
+        if path.suffix != ".toml" or not path.is_file():
+            raise RecipeError(
+                f"no print profile {name!r}: use one of {', '.join(known)}, "
+                "or the path of a .toml file with the same fields"
+            )
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise RecipeError(f"print profile {path}: cannot be read: {error}") from error
+    try:
+        return Profile.model_validate(data)
+    except ValidationError as error:
+        faults = "; ".join(
+            f"{'.'.join(map(str, fault['loc'])) or 'profile'}: {fault['msg']}"
+            for fault in error.errors()
+        )
+        raise RecipeError(f"print profile {path}: {faults}") from error
