@@ -10,7 +10,7 @@
 
     double_hinge_meshes(
         voxel_mm, clearance_mm, first="+y", second="-y", turns=(180, 180), *,
-        barrel_radius_mm=None, pin_radius_mm=None, knuckles=None, plate_mm=2.0,
+        barrel_radius_mm=None, pin_radius_mm=None, knuckles=None, plate_mm=None,
         gap_mm=None, bracket_mm=None, margin_mm=None, wall_mm=0.8, segments=64,
     ) -> DoubleHingeMeshes(parent_half, link, child_half, parent_carve, child_carve,
                            barrel_radius_mm, pin_radius_mm, knuckles, reach_mm)
@@ -25,11 +25,11 @@ At angle 0 the parent's material is in the quadrant x < 0, y < 0 and the child's
 x points from the parent's cell to the child's, y outwards from the shared face at the hinged edge.
 A positive turn of the child about +z takes it through x > 0, y > 0 to x < 0, y > 0 at 180°.
 
-Frame of a double hinge: the face that both cells share is |y|, |z| ≤ voxel/2 of the plane x = 0, the
-parent's cell lies at x < 0 and the child's at x > 0. `first` and `second` name the edge of that face
-on which the parent-link and the link-child axis runs: "+y", "-y", "+z" or "-z". A positive first
-angle turns link and child about the direction ``x × edge``, a positive second angle the child about
-``x × edge`` of its own edge: both carry the child away from the face and around the edge.
+Frame of a double hinge: the face that both cells share is |y|, |z| ≤ voxel/2 of the plane x = 0,
+the parent's cell lies at x < 0 and the child's at x > 0. `first` and `second` name the edges of
+that face on which the parent-link and the link-child axis run: "+y", "-y", "+z" or "-z". A positive
+first angle turns link and child about the direction ``x × edge``, a positive second angle the child
+about ``x × edge`` of its own edge: both carry the child away from the face and around the edge.
 `link` is a body of its own. The carves hold the pockets for the link plate at 0 and, for a turn of
 270, where it comes to lie on the other face; no material of the bodies may lie within gap/2 of the
 faces of their cells.
@@ -327,8 +327,8 @@ def double_hinge_meshes(
         As for :func:`single_hinge_meshes`.
     knuckles : int, optional
         On each axis, 3 by default; 5 when both share an edge.
-    plate_mm : float
-        Thickness of the link plate.
+    plate_mm : float, optional
+        Thickness of the link plate; 2, or thinner where a small barrel asks for it.
 
     Returns
     -------
@@ -364,7 +364,7 @@ def _double(
     barrel_radius_mm: float | None = None,
     pin_radius_mm: float | None = None,
     knuckles: int | None = None,
-    plate_mm: float = 2.0,
+    plate_mm: float | None = None,
     gap_mm: float | None = None,
     bracket_mm: float | None = None,
     margin_mm: float | None = None,

@@ -38,6 +38,21 @@ EDGES: Final[dict[str, tuple[float, float, float]]] = {
 _TURNS: Final = (90.0, 180.0, 270.0)
 
 
+def _neck(radius: float, plate: float, clearance: Clearance, top: float | None) -> float:
+    """Width in mm of the joint between a barrel and the bracket beside a link plate.
+
+    `top` is how far the block's outer face lies inside the axis; None where the plate comes to lie
+    on it.
+    """
+    near = 0.5 * plate + clearance.radial
+    top = near if top is None else top
+    if near**2 + top**2 >= radius**2:
+        return 0.0
+    along = sqrt(radius**2 - near**2) - top
+    across = sqrt(radius**2 - top**2) - near
+    return sqrt(along**2 + across**2)
+
+
 @dataclass(frozen=True)
 class DoubleSpec:
     """All parameters of a double hinge, defaults filled in; see :class:`hinges.DoubleHinge`."""
@@ -72,7 +87,7 @@ class DoubleSpec:
         radius: float | None = None,
         pin: Pin | None = None,
         clearance: Clearance | float | str = "fdm",
-        plate: float = 2.0,
+        plate: float | None = None,
         bracket: Bracket | None = None,
         gap: float | None = None,
         chamfer: float = 0.0,
@@ -93,6 +108,18 @@ class DoubleSpec:
                 radius = max(2.0, 0.1 * -floor(-10.0 * pin.thinnest_barrel(room, thin, knuckles)))
         if pin is None:
             pin = ConePin(max(default_pin_radius(radius, room, thin), 0.3))
+        space = room.radial if gap is None else float(gap)
+        if plate is None:
+            tops = [space / 2.0 if turn <= 180.0 else None for turn in turns]
+            thicknesses = (2.0, 1.8, 1.6, 1.4, 1.2)
+            plate = next(
+                (
+                    t
+                    for t in thicknesses
+                    if min(_neck(radius, t, room, top) for top in tops) >= thin
+                ),
+                2.0,
+            )
         return cls(
             float(size),
             first,
@@ -105,7 +132,7 @@ class DoubleSpec:
             room,
             float(plate),
             Bracket() if bracket is None else bracket,
-            room.radial if gap is None else float(gap),
+            space,
             float(chamfer),
             radius + room.radial if margin is None else float(margin),
             thin,
@@ -256,15 +283,9 @@ def _check(spec: DoubleSpec, trains: tuple[Train, ...]) -> None:
         2.0 * spec.wall,
         "use smaller barrels or a larger face",
     )
-    near = 0.5 * spec.plate + spec.clearance.radial
     for axis in (0, 1):
-        top = _block_top(spec, axis)
-        inside = spec.radius**2 - max(near, top) ** 2
-        neck = 0.0
-        if near**2 + top**2 < spec.radius**2 and inside > 0.0:
-            along = sqrt(spec.radius**2 - near**2) - top
-            across = sqrt(spec.radius**2 - top**2) - near
-            neck = sqrt(along**2 + across**2)
+        top = 0.5 * spec.gap if spec.turns[axis] <= 180.0 else None
+        neck = _neck(spec.radius, spec.plate, spec.clearance, top)
         at_least(
             "plate",
             f"the neck between barrel and bracket beside the link plate (axis {axis + 1})",

@@ -1,0 +1,356 @@
+"""A hinge with a link plate and two axes, as a build123d part."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Literal
+
+from build123d import (
+    Align,
+    Axis,
+    BasePartObject,
+    Color,
+    Location,
+    Mode,
+    Part,
+    Plane,
+    RevoluteJoint,
+    RigidJoint,
+    Rotation,
+    Solid,
+)
+
+from .brep import build_all, build_half, build_shape, one_part, solids_of
+from .clearance import Clearance
+from .errors import HingeError
+from .leaf import Bracket
+from .pins import Pin
+from .plan import HalfPlan
+from .plan_double import (
+    DoublePlan,
+    DoubleSpec,
+    Matrix,
+    child_pose,
+    link_pose,
+    plan_double,
+)
+
+if TYPE_CHECKING:
+    from build123d import RotationLike
+
+__all__ = ["DoubleHinge", "DoubleHingeCarve", "DoubleHingePart"]
+
+Body = Literal["parent", "link", "child"]
+COLORS = {
+    "parent": (0.20, 0.45, 0.70),
+    "link": (0.35, 0.65, 0.35),
+    "child": (0.90, 0.55, 0.15),
+}
+
+
+def _body(name: str) -> Body:
+    if name == "parent":
+        return "parent"
+    if name == "link":
+        return "link"
+    if name == "child":
+        return "child"
+    raise HingeError(f"body {name!r}: use 'parent', 'link' or 'child'")
+
+
+def _half_plan(spec: DoubleSpec, body: Body) -> HalfPlan:
+    plan = plan_double(spec)
+    return {"parent": plan.parent, "link": plan.link, "child": plan.child}[body]
+
+
+@lru_cache(maxsize=128)
+def _piece(spec: DoubleSpec, body: Body) -> Solid:
+    return build_half(_half_plan(spec, body), body).solid()
+
+
+@lru_cache(maxsize=128)
+def _carve(spec: DoubleSpec, body: Body) -> tuple[Solid, ...]:
+    return tuple(build_all(_half_plan(spec, body).carve).solids())
+
+
+def _location(matrix: Matrix) -> Location:
+    origin, x_dir, z_dir = (tuple(map(float, matrix[:3, column])) for column in (3, 0, 2))
+    return Plane(origin=origin, x_dir=x_dir, z_dir=z_dir).location
+
+
+def _pose(spec: DoubleSpec, body: Body) -> Location:
+    first, second = spec.angles
+    if body == "parent":
+        return Location()
+    return _location(link_pose(spec, first) if body == "link" else child_pose(spec, first, second))
+
+
+class DoubleHinge(BasePartObject):  # type: ignore[misc]
+    """Two boxes joined by a link plate that turns on both: three bodies, two axes.
+
+    The shared face is the square |y|, |z| ≤ size / 2 of the plane x = 0; the parent's box lies at
+    x < 0, the child's at x > 0, the link plate between them. Each axis runs along one edge of the
+    face, named by its direction: "+y", "-y", "+z" or "-z". Opposite edges give parallel axes,
+    neighbouring ones perpendicular axes, and the same edge twice one common line. Both angles count
+    from the closed pose; a positive one carries the child away from the face and around the edge.
+
+    Parameters
+    ----------
+    size : float
+        Side of the face in mm.
+    first, second : {"+y", "-y", "+z", "-z"}
+        Edges of the parent-link and the link-child axis.
+    turns : (float, float)
+        How far each axis turns: 90, 180 or 270 degrees. With 270 the plate comes to lie on the
+        neighbouring face of the body, which is let in for it.
+    angles : (float, float)
+        The pose that it is drawn (and printed) in, degrees.
+    knuckles : int, optional
+        On each axis; 3 when left out. Both axes on one edge need 5 or 9.
+    radius, pin, clearance, gap, chamfer, margin, wall, bore
+        As for :class:`SingleHinge`.
+    plate : float, optional
+        Thickness of the link plate in mm; 2, or thinner where a small barrel asks for it.
+    bracket : Bracket, optional
+    up : float
+        Direction of printing in degrees about each axis, from the direction that points from the
+        body to the link; for the bores' roofs.
+    rotation, align, mode
+        As for every build123d part.
+
+    Attributes
+    ----------
+    parent_half, link, child_half : Part
+        The link is a body of its own, the halves belong to the two bodies. Their joints chain up:
+        ``parent_half.joints["link"]`` turns ``link.joints["parent"]``, and
+        ``link.joints["child"]`` turns ``child_half.joints["link"]``.
+    parent_carve, child_carve : Part
+        To cut from the two bodies first: ``body - carve + half``.
+    spec : DoubleSpec
+    plan : DoublePlan
+
+    Raises
+    ------
+    FitError
+        If the hinge cannot be printed, naming the rule and what to change.
+    HingeError
+        If a parameter makes no sense.
+
+    Examples
+    --------
+    >>> hinge = DoubleHinge(20, first="+y", second="+z", turns=(180, 90), clearance=0.3)
+    >>> len(hinge.solids())
+    3
+    """
+
+    def __init__(
+        self,
+        size: float,
+        *,
+        first: str = "+y",
+        second: str = "-y",
+        turns: tuple[float, float] = (180.0, 180.0),
+        angles: tuple[float, float] = (0.0, 0.0),
+        knuckles: int | None = None,
+        radius: float | None = None,
+        pin: Pin | None = None,
+        clearance: Clearance | float | str = "fdm",
+        plate: float | None = None,
+        bracket: Bracket | None = None,
+        gap: float | None = None,
+        chamfer: float = 0.0,
+        margin: float | None = None,
+        wall: float | None = None,
+        bore: Literal["round", "teardrop", "octagon"] = "round",
+        up: float = 90.0,
+        rotation: RotationLike = (0, 0, 0),
+        align: Align | tuple[Align, Align, Align] | None = None,
+        mode: Mode = Mode.ADD,
+    ) -> None:
+        self.spec = DoubleSpec.read(
+            size,
+            first=first,
+            second=second,
+            turns=turns,
+            angles=angles,
+            knuckles=knuckles,
+            radius=radius,
+            pin=pin,
+            clearance=clearance,
+            plate=plate,
+            bracket=bracket,
+            gap=gap,
+            chamfer=chamfer,
+            margin=margin,
+            wall=wall,
+            bore=bore,
+            up=up,
+        )
+        plan_double(self.spec)
+        super().__init__(part=self.make_hinge(), rotation=rotation, align=align, mode=mode)
+        self.label = "double hinge"
+        self.color = Color(*COLORS["parent"])
+        RigidJoint("parent", self, Location())
+
+    def make_hinge(self) -> Part:
+        """Build all three bodies in the drawn pose."""
+        bodies: tuple[Body, ...] = ("parent", "link", "child")
+        return one_part([_piece(self.spec, body).moved(_pose(self.spec, body)) for body in bodies])
+
+    @property
+    def plan(self) -> DoublePlan:
+        """Every shape of the hinge as data."""
+        return plan_double(self.spec)
+
+    @property
+    def parent_half(self) -> Part:
+        """The parent's knuckles and bracket; its joint "link" turns."""
+        return DoubleHingePart(self, "parent", mode=Mode.PRIVATE)
+
+    @property
+    def link(self) -> Part:
+        """The link plate; its joint "parent" is rigid, its joint "child" turns."""
+        return DoubleHingePart(self, "link", mode=Mode.PRIVATE)
+
+    @property
+    def child_half(self) -> Part:
+        """The child's knuckles and bracket in the drawn pose; its joint "link" is rigid."""
+        return DoubleHingePart(self, "child", mode=Mode.PRIVATE)
+
+    @property
+    def parent_carve(self) -> Part:
+        """What the parent's body gives up: grooves, and pockets for the link plate."""
+        return DoubleHingeCarve(self, "parent", mode=Mode.PRIVATE)
+
+    @property
+    def child_carve(self) -> Part:
+        """What the child's body, in the drawn pose, gives up."""
+        return DoubleHingeCarve(self, "child", mode=Mode.PRIVATE)
+
+    @property
+    def hardware(self) -> Part | None:
+        """The loose pins in the pose with both angles 0, or None for printed ones."""
+        loose = self.plan.loose
+        return one_part([build_shape(shape) for shape in loose]) if loose else None
+
+    def fit(
+        self, parent: Part | Solid, child: Part | Solid, at: Location | Plane | None = None
+    ) -> tuple[Part, Part, Part]:
+        """Let the hinge into two bodies.
+
+        Parameters
+        ----------
+        parent, child : Part or Solid
+            The bodies in the drawn pose, at least half the gap away from their shared face.
+        at : Location or Plane, optional
+            Where the hinge's frame lies.
+
+        Returns
+        -------
+        parent, link, child : Part
+            With their joints, as on the hinge's own bodies.
+
+        Raises
+        ------
+        HingeError
+            If a body does not come out in one piece.
+        """
+        place = at.location if isinstance(at, Plane) else (at or Location())
+        made = []
+        for name, body in (("parent", parent), ("child", child)):
+            half = DoubleHingePart(self, _body(name), mode=Mode.PRIVATE).moved(place)
+            carve = DoubleHingeCarve(self, _body(name), mode=Mode.PRIVATE).moved(place)
+            solids = solids_of(solids_of(body)[0].cut(*carve.solids()))
+            fitted = one_part(solids_of(solids[0].fuse(*solids[1:], *half.solids())))
+            if len(fitted.solids()) != 1:
+                raise HingeError(
+                    f"the {name} body came out in {len(fitted.solids())} pieces: it must reach the "
+                    "bracket of its half, and the carve must not cut it in two"
+                )
+            fitted.label = body.label or name
+            fitted.color = body.color
+            made.append(fitted)
+        link = one_part([self.link.moved(place).solid()])
+        link.label, link.color = "link", Color(*COLORS["link"])
+        _add_joints(self.spec, made[0], "parent", place)
+        _add_joints(self.spec, link, "link", place)
+        _add_joints(self.spec, made[1], "child", place)
+        return made[0], link, made[1]
+
+
+def _add_joints(spec: DoubleSpec, part: Part, body: Body, place: Location) -> None:
+    """Put the joints of one body on the true axes, in the drawn pose."""
+    first, second = spec.angles
+    at_link = place * _location(link_pose(spec, first))
+    axes = []
+    for axis, pose in ((0, place), (1, at_link)):
+        frame = spec.frame(axis)
+        if axis:  # the child turns about the link's own direction of the edge
+            frame = frame.copy()
+            frame[:3, 0] *= -1.0
+            frame[:3, 2] *= -1.0
+        plane = Plane(pose * _location(frame))
+        axes.append(Axis(plane.origin, plane.z_dir))
+    ranges = [(0.0, turn) for turn in spec.turns]
+    if body == "parent":
+        RevoluteJoint("link", part, axis=axes[0], angular_range=ranges[0])
+    elif body == "link":
+        RigidJoint("parent", part, axes[0].location * Rotation(0, 0, first))
+        RevoluteJoint("child", part, axis=axes[1], angular_range=ranges[1])
+    else:
+        RigidJoint("link", part, axes[1].location * Rotation(0, 0, second))
+
+
+class DoubleHingePart(BasePartObject):  # type: ignore[misc]
+    """One body of a double hinge: the parent's half, the link, or the child's half.
+
+    Parameters
+    ----------
+    hinge : DoubleHinge
+    body : {"parent", "link", "child"}
+    rotation, align, mode
+        As for every build123d part.
+    """
+
+    def __init__(
+        self,
+        hinge: DoubleHinge,
+        body: Body,
+        rotation: RotationLike = (0, 0, 0),
+        align: Align | tuple[Align, Align, Align] | None = None,
+        mode: Mode = Mode.ADD,
+    ) -> None:
+        body = _body(body)
+        part = one_part([_piece(hinge.spec, body).moved(_pose(hinge.spec, body))])
+        super().__init__(part=part, rotation=rotation, align=align, mode=mode)
+        self.label = "link" if body == "link" else f"{body} half"
+        self.color = Color(*COLORS[body])
+        _add_joints(hinge.spec, self, body, Location())
+
+
+class DoubleHingeCarve(BasePartObject):  # type: ignore[misc]
+    """What a body gives up to a double hinge.
+
+    Parameters
+    ----------
+    hinge : DoubleHinge
+    body : {"parent", "child"}
+    rotation, align, mode
+        As for every build123d part; subtracted from the part under construction by default.
+    """
+
+    def __init__(
+        self,
+        hinge: DoubleHinge,
+        body: Body,
+        rotation: RotationLike = (0, 0, 0),
+        align: Align | tuple[Align, Align, Align] | None = None,
+        mode: Mode = Mode.SUBTRACT,
+    ) -> None:
+        body = _body(body)
+        if body == "link":
+            raise HingeError("the link is a body of its own: only parent and child are carved")
+        pose = _pose(hinge.spec, body)
+        part = one_part([solid.moved(pose) for solid in _carve(hinge.spec, body)])
+        super().__init__(part=part, rotation=rotation, align=align, mode=mode)
+        self.label = f"{body} carve"
