@@ -8,9 +8,6 @@ from fabfold.solid.samples.shapes import both_sides, cylinder_y, ellipsoid, fuse
 
 __all__ = ["draw"]
 
-AXLE = 8.0
-
-
 def draw() -> Any:
     """Draw the locomotive: 10 mm a voxel, looking along +x."""
     from build123d import (
@@ -25,7 +22,6 @@ def draw() -> Any:
         fillet,
         loft,
         make_face,
-        Rectangle,
     )
 
     frame = Pos(-1, 0, 11) * Box(60, 22, 8)
@@ -49,15 +45,21 @@ def draw() -> Any:
     cab = Pos(-20, 0, 28) * Box(20, 27, 30)
     cab = fillet(cab.edges().filter_by(Axis.Z), 2.5)
     opening = Pos(-20, 0, 33) * fillet(Box(11, 60, 11).edges().filter_by(Axis.Y), 2)
-    cab = cab - (opening - Pos(-20, 0, 30) * Box(40, 24.5, 40))
+    cab = cab - (opening - Pos(-20, 0, 30) * Box(40, 21.5, 40))
     roof = Pos(-20, 0, 22) * Rot(0, 90, 0) * Cylinder(26, 25)
     roof = roof & (Pos(-20, 0, 60) * Box(25, 33, 35))
     roof = fillet(roof.edges().filter_by(Axis.X), 1.2)
     bunker = Pos(-29, 0, 20) * fillet(Box(9, 24, 12).edges().filter_by(Axis.Z), 2)
 
-    catcher = loft(
-        [Plane.YZ.offset(26) * Pos(0, 7.5) * Rectangle(26, 13), Plane.YZ.offset(35) * Pos(0, 2.5) * Rectangle(10, 3)]
+    catcher = extrude(
+        Plane.XY.offset(1.5) * make_face(Polyline([(24, -12), (36, 0), (24, 12)], close=True)),
+        11,
+        taper=12,
     )
+    slots = [
+        Pos(30, y, 6) * Rot(0, 0, 45 if y > 0 else -45) * Box(2, 8, 20) for y in (-11, -7.5, 7.5, 11)
+    ]
+    del slots
     parts = [frame, boiler, door, knob, lamp, *bands, chimney, crown, rim, dome, cab, roof]
     parts += [bunker, catcher]
     for x, radius in ((-21.0, 9.0), (-1.5, 9.0), (15.5, 6.5)):
@@ -68,7 +70,6 @@ def draw() -> Any:
         parts += both_sides(hub)
     rod = Pos(-11.2, 16.2, 9) * fillet(Box(24, 2.4, 3.4).edges().filter_by(Axis.Y), 1.5)
     parts += both_sides(rod)
-    del Polyline, extrude, make_face
     return fuse([fuse(parts) - mouth])
 
 

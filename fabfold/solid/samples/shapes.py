@@ -32,35 +32,35 @@ def ellipsoid(centre: Triple, radii: Triple, turn: Triple = (0, 0, 0)) -> Any:
     return place * upright * revolve(Plane.XZ * outline, Axis.Z)
 
 
-def limb(points: Sequence[Triple], radii: Sequence[float], squash: float = 1.0) -> Any:
+def limb(points: Sequence[Triple], radii: Sequence[float]) -> Any:
     """Round limb through points: circles lofted along a curve, with ball ends.
 
     Parameters
     ----------
     points : sequence of (x, y, z)
-        Where the middle line passes.
+        Where the middle line passes; two make a straight limb.
     radii : sequence of float
         Radius at each point.
-    squash : float, optional
-        Not 1 to make the sections elliptical: the factor of their second axis.
     """
-    from build123d import Circle, Ellipse, Plane, Pos, Sphere, Spline, Vector, loft
+    from build123d import Circle, Plane, Pos, Solid, Sphere, Spline, Vector, loft
 
-    line = Spline(*points) if len(points) > 2 else None
+    ends = [Pos(*points[end]) * Sphere(radii[end]) for end in (0, -1)]
+    if len(points) == 2:
+        tangent = Vector(*points[1]) - Vector(*points[0])
+        plane = Plane(origin=points[0], z_dir=tangent)
+        if radii[0] == radii[1]:
+            stem = Solid.make_cylinder(radii[0], tangent.length, plane)
+        else:
+            stem = Solid.make_cone(radii[0], radii[1], tangent.length, plane)
+        return stem.fuse(*ends)
+    line = Spline(*points)
     sections = []
     for point, radius in zip(points, radii, strict=True):
-        if line is None:
-            tangent = Vector(*points[-1]) - Vector(*points[0])
-        else:
-            tangent = line.tangent_at(Vector(*point))
-        plane = Plane(origin=point, x_dir=_across(tangent), z_dir=tangent)
-        flat = Circle(radius) if squash == 1.0 else Ellipse(radius, radius * squash)
-        sections.append(plane * flat)
-    body = loft(sections)
-    if squash == 1.0:
-        for end in (0, -1):
-            body = body + Pos(*points[end]) * Sphere(radii[end])
-    return body
+        tangent = line.tangent_at(Vector(*point))
+        sections.append(
+            Plane(origin=point, x_dir=_across(tangent), z_dir=tangent) * Circle(radius)
+        )
+    return loft(sections).fuse(*ends)
 
 
 def _across(tangent: Any) -> Any:
