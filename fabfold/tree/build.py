@@ -74,9 +74,7 @@ class HingeChoice:
         """One random spanning tree, or None where the hinges do not join all the clusters."""
         hinges = self.clusters - 1
         chosen = np.empty(hinges, np.int32)
-        left = spanning_tree(
-            self.found, len(self.found), self.clusters, wanted, generator, chosen
-        )
+        left = spanning_tree(self.found, len(self.found), self.clusters, wanted, generator, chosen)
         if left > 1:
             return None
         body = np.empty(len(self.label), np.int32)

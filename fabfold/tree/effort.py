@@ -41,8 +41,8 @@ class Effort:
         Most candidates returned.
     """
 
-    beam: int = 30
-    roots: int = 400
+    beam: int = 10
+    roots: int = 100
     restarts: int = 6
     removals: int = 0
     folding: int = 2500

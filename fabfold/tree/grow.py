@@ -90,11 +90,13 @@ def _survey(
     stamp: NDArray[np.int32],
     reach: NDArray[np.int32],
     flood: bool,
+    lenient: bool,
 ) -> int:
     """Pick the most constrained voxel that can be placed next; -1 when the state is dead.
 
     A state is dead when a voxel has no place left, or when the free cells that the frontier can
-    reach are fewer than the voxels left.
+    reach are fewer than the voxels left. A lenient survey overlooks that, and returns -1 only
+    when nothing can be placed.
     """
     best = -1
     best_key = 1e18
@@ -135,7 +137,7 @@ def _survey(
         if placed == 0:
             continue
         if found == 0:
-            if waiting == 0:
+            if waiting == 0 and not lenient:
                 return -1
             continue
         key = found + priority[v]
@@ -193,6 +195,7 @@ def fill_beam(
     width: int,
     noise: float,
     joint_share: float,
+    lenient: bool,
     generator: NDArray[np.uint64],
     out: NDArray[np.int32],
 ) -> tuple[int, int]:
@@ -213,6 +216,8 @@ def fill_beam(
         Amplitude of the random part of a state's score.
     joint_share : float
         Factor on the joint weights while growing (less than 1 grows more, smaller clusters).
+    lenient : bool
+        Give back the states with the most voxels placed where none is complete.
     generator : (1,) uint64 array
         Random state, advanced.
     out : (width, n) int32 array
@@ -253,18 +258,23 @@ def fill_beam(
     for v in range(count):
         if start[v] >= 0:
             taken[0, 0, start[v] // 24] = True
-    flood = len(todo) > 8
-    pick[0, 0] = _survey(tables, pose[0, 0], taken[0, 0], todo, priority, mark, stamp, reach, flood)
+    flood = len(todo) > 8 and not lenient
+    pick[0, 0] = _survey(
+        tables, pose[0, 0], taken[0, 0], todo, priority, mark, stamp, reach, flood, lenient
+    )
     if pick[0, 0] < 0:
-        return 0, 1
+        out[0] = start
+        return (1 if lenient else 0), 1
     states = 1
     expansions = 0
     now = 0
     for level in range(len(todo)):
         options = 0
         for b in range(states):
-            expansions += 1
             v = pick[now, b]
+            if v < 0:
+                continue
+            expansions += 1
             here = pose[now, b]
             stamp[0] += 1
             for f in range(6):
@@ -326,8 +336,9 @@ def fill_beam(
                     stamp,
                     reach,
                     flood,
+                    lenient,
                 )
-                if pick[nxt, kept] < 0:
+                if pick[nxt, kept] < 0 and not lenient:
                     continue
                 label[nxt, kept] = label[now, b]
                 merged = _merged(tables, pose[now, b], label[now, b], v, q, joined)
@@ -341,7 +352,9 @@ def fill_beam(
             key[nxt, kept] = zobrist[place]
             kept += 1
         if kept == 0:
-            return 0, expansions
+            if not lenient:
+                return 0, expansions
+            break
         states = kept
         now = nxt
     for b in range(states):

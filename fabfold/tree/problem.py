@@ -174,7 +174,10 @@ def _surface_table(
     pattern_mean = by_pattern.mean(axis=0)
     voxel_mean = (by_pattern - pattern_mean)[:, exposed].mean(axis=1)
     centre = pattern_mean[None, :] + voxel_mean[:, None]
-    return surface.astype(np.float32), centre.astype(np.float32)
+    return (
+        np.ascontiguousarray(surface, dtype=np.float32),
+        np.ascontiguousarray(centre, dtype=np.float32),
+    )
 
 
 def tree_problem(
@@ -249,7 +252,8 @@ def tree_problem(
         exposed=exposed,
         around=around,
         source=cells,
-        cells=template.cells,
+        # A template's own cells are read-only, which would be another signature to the kernels.
+        cells=template.cells.copy(),
         rotations=ROTATIONS,
     )
     return TreeProblem(

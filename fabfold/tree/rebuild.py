@@ -13,7 +13,7 @@ from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_float
 from fabfold.tree.wedge import HingeTables, blocked
 
-__all__ = ["candidates", "connected", "loose_pieces", "rooted", "spanning_tree"]
+__all__ = ["apart", "candidates", "loose_pieces", "rooted", "spanning_tree"]
 
 
 @njit(cache=True)
@@ -26,26 +26,36 @@ def relation(tables: Tables, u: int, f: int, v: int, pose: NDArray[np.int32]) ->
 
 
 @njit(cache=True)
-def connected(tables: Tables, pose: NDArray[np.int32]) -> bool:
-    """Whether the joints that a full set of poses allows join all the voxels."""
+def apart(tables: Tables, pose: NDArray[np.int32]) -> int:
+    """Voxels without a place, plus the pieces, less one, that the possible joints leave.
+
+    Zero for a full set of poses that some tree joins.
+    """
     count = len(pose)
     seen = np.zeros(count, np.bool_)
     stack = np.empty(count, np.int32)
-    seen[0] = True
-    stack[0] = 0
-    top = 1
-    found = 1
-    while top > 0:
-        top -= 1
-        u = stack[top]
-        for f in range(6):
-            v = tables.neighbour[u, f]
-            if v >= 0 and not seen[v] and relation(tables, u, f, v, pose) >= 0:
-                seen[v] = True
-                found += 1
-                stack[top] = v
-                top += 1
-    return found == count
+    total = -1
+    for first in range(count):
+        if seen[first]:
+            continue
+        seen[first] = True
+        total += 1
+        if pose[first] < 0:
+            continue
+        stack[0] = first
+        top = 1
+        while top > 0:
+            top -= 1
+            u = stack[top]
+            for f in range(6):
+                v = tables.neighbour[u, f]
+                if v < 0 or seen[v] or pose[v] < 0:
+                    continue
+                if relation(tables, u, f, v, pose) >= 0:
+                    seen[v] = True
+                    stack[top] = v
+                    top += 1
+    return total
 
 
 @njit(cache=True)

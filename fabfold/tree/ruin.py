@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from fabfold.tree.grow import clusters, energy_of, fill_beam
 from fabfold.tree.problem import Tables
-from fabfold.tree.rebuild import candidates, connected, loose_pieces
+from fabfold.tree.rebuild import apart, candidates, loose_pieces
 from fabfold.tree.rng import random_below, random_float
 from fabfold.tree.wedge import HingeTables
 
-__all__ = ["propose", "ruin"]
+__all__ = ["propose", "repair", "ruin"]
 
 
 @njit(cache=True)
@@ -185,7 +185,9 @@ def propose(
                 start[v] = -1
                 todo[k] = v
                 k += 1
-        rows, _ = fill_beam(tables, start, todo, width, noise, joint_share, generator, results)
+        rows, _ = fill_beam(
+            tables, start, todo, width, noise, joint_share, False, generator, results
+        )
         best = np.inf
         best_row = -1
         best_found = 0
@@ -198,7 +200,7 @@ def propose(
             if same:
                 continue
             energy, found = energy_of(tables, results[r], empty_face)
-            if energy > threshold or energy >= best or not connected(tables, results[r]):
+            if energy > threshold or energy >= best or apart(tables, results[r]) > 0:
                 continue
             total, rows_found = candidates(tables, results[r], hinges, new_label, hinge)
             energy += loose * loose_pieces(hinge, rows_found, total, 4, generator)
@@ -210,3 +212,120 @@ def propose(
             out[:] = results[best_row]
             return attempt + 1, best, best_found
     return tries, np.inf, 0
+
+
+@njit(cache=True)
+def _patch(
+    tables: Tables,
+    pose: NDArray[np.int32],
+    holder: NDArray[np.int32],
+    most: int,
+    generator: NDArray[np.uint64],
+    out: NDArray[np.bool_],
+) -> None:
+    """Choose voxels around one that has no place and around a cell that is empty."""
+    count = len(pose)
+    edge = np.empty(2 * count, np.int32)
+    size = 0
+    out[:] = False
+    homeless = np.flatnonzero(pose < 0)
+    if len(homeless) > 0:
+        edge[0] = homeless[random_below(generator, len(homeless))]
+        size = 1
+    empty = np.flatnonzero(holder < 0)
+    if len(empty) > 0:
+        cell = empty[random_below(generator, len(empty))]
+        for f in range(6):
+            other = tables.around[cell, f]
+            if other >= 0 and holder[other] >= 0 and random_float(generator) < 0.6:
+                v = holder[other]
+                if not out[v]:
+                    out[v] = True
+                    edge[size] = v
+                    size += 1
+    if size == 0:
+        edge[0] = random_below(generator, count)
+        size = 1
+    want = 2 + random_below(generator, most - 1)
+    for _ in range(4 * want):
+        if size >= want:
+            break
+        u = edge[random_below(generator, size)]
+        f = random_below(generator, 6)
+        v = tables.neighbour[u, f]
+        if pose[u] >= 0 and random_float(generator) < 0.5:
+            cell = tables.around[pose[u] // 24, f]
+            v = holder[cell] if cell >= 0 else -1
+        if v >= 0 and not out[v] and pose[v] >= 0:
+            out[v] = True
+            edge[size] = v
+            size += 1
+
+
+@njit(cache=True)
+def repair(
+    tables: Tables,
+    pose: NDArray[np.int32],
+    tries: int,
+    most: int,
+    width: int,
+    generator: NDArray[np.uint64],
+) -> tuple[int, int]:
+    """Place the voxels for which growing found no room, by moving others out of the way.
+
+    Parameters
+    ----------
+    pose : (n,) int32 array
+        Poses, -1 for voxels without a place; improved in place.
+    tries : int
+        Most removals tried.
+    most : int
+        Most voxels moved at a time.
+    width : int
+        Of the beam.
+    generator : (1,) uint64 array
+
+    Returns
+    -------
+    left : int
+        Voxels without a place, plus the pieces (less one) into which the joints leave the rest.
+    used : int
+        Removals tried.
+    """
+    count = len(pose)
+    holder = np.full(len(tables.cells), -1, np.int32)
+    for v in range(count):
+        if pose[v] >= 0:
+            holder[pose[v] // 24] = v
+    gone = np.empty(count, np.bool_)
+    results = np.empty((width, count), np.int32)
+    start = np.empty(count, np.int32)
+    left = apart(tables, pose)
+    used = 0
+    while left > 0 and used < tries:
+        used += 1
+        _patch(tables, pose, holder, most, generator, gone)
+        placed = 0
+        for v in range(count):
+            start[v] = -1 if gone[v] else pose[v]
+            if start[v] >= 0:
+                placed += 1
+        if placed == 0:
+            continue
+        todo = np.flatnonzero(start < 0).astype(np.int32)
+        rows, _ = fill_beam(tables, start, todo, width, 1.0, 0.0, True, generator, results)
+        best = count
+        best_row = -1
+        for r in range(rows):
+            missing = apart(tables, results[r])
+            if missing < best:
+                best = missing
+                best_row = r
+        if best_row >= 0 and (best <= left or random_float(generator) < 0.002):
+            left = best
+            pose[:] = results[best_row]
+            holder[:] = -1
+            for v in range(count):
+                if pose[v] >= 0:
+                    holder[pose[v] // 24] = v
+    return left, used

@@ -19,7 +19,7 @@ from fabfold.tree.model import FoldTree
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.rebuild import loose_pieces
 from fabfold.tree.rng import generator
-from fabfold.tree.ruin import propose
+from fabfold.tree.ruin import propose, repair
 from fabfold.tree.wedge import hinge_tables
 
 __all__ = ["Candidate", "Statistics", "grow", "solve"]
@@ -93,9 +93,12 @@ def _scale(voxels: int) -> _Scale:
 
 
 def grow(
-    problem: TreeProblem, seed: int, *, beam: int = 30, roots: int = 400
+    problem: TreeProblem, seed: int, *, beam: int = 10, roots: int = 400, repairs: int = 2000
 ) -> Iterator[NDArray[np.int32]]:
-    """Full sets of poses grown from random root poses, best of each root.
+    """Full sets of poses grown from random root poses.
+
+    The beam seldom completes a template that has no cell to spare; what it leaves over is then
+    placed by moving other voxels out of the way.
 
     Parameters
     ----------
@@ -105,6 +108,8 @@ def grow(
         States kept.
     roots : int
         Root poses tried.
+    repairs : int
+        Removals tried to complete a set of poses.
 
     Yields
     ------
@@ -129,12 +134,12 @@ def grow(
         start = np.full(count, -1, np.int32)
         start[root] = 24 * wanted[rng.integers(len(wanted))] + rng.integers(24)
         todo = np.flatnonzero(start < 0).astype(np.int32)
-        if len(todo) == 0:
+        if len(todo):
+            fill_beam(problem.tables, start, todo, beam, 0.3, 0.5, True, state, out)
+            start = out[0].copy()
+        left, _ = repair(problem.tables, start, repairs, 20, 12, state)
+        if left == 0:
             yield start
-            continue
-        found, _ = fill_beam(problem.tables, start, todo, beam, 0.1, 1.0, state, out)
-        if found:
-            yield out[0].copy()
 
 
 class _Search:
