@@ -16,7 +16,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FLAT_MM", "Axis", "Plane", "Round", "Surface", "flat_regions", "round_regions"]
+__all__ = [
+    "FLAT_MM",
+    "Axis",
+    "Plane",
+    "Round",
+    "Surface",
+    "flat_regions",
+    "round_regions",
+    "sculpted_triangles",
+]
 
 #: Corners this near to a plane lie in it, mm.
 FLAT_MM = 1e-3
@@ -74,6 +83,9 @@ class Round:
 
 
 Surface = Plane | Round
+#: Index of the axis, radius at its point, slope, and whether the normal points away from it.
+Strip = tuple[int, float, float, bool]
+Strips = dict[int, Strip]
 
 
 def _neighbours(faces: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -170,7 +182,7 @@ def _strip(
         return None
     far = radius > 10 * ROUND_MM
     turn = np.angle(np.exp(1j * (angle[far] - angle[far][0])))
-    if np.ptp(turn) > np.radians(31.0) or np.ptp(turn) < 1e-3:
+    if np.ptp(turn) > np.radians(12.0) or np.ptp(turn) < 1e-3:
         return None
     if np.ptp(radius) < ROUND_MM:
         fit = (float((radius.min() + radius.max()) / 2), 0.0)
@@ -213,8 +225,46 @@ def round_regions(
     surfaces : list of Plane or Round
     """
     rims = _rims(faces, labels)
-    strips: dict[int, tuple[int, float, float, bool]] = {}
     corners_of = _corners_by_region(faces, labels, len(planes))
+    strips = _strips(vertices, faces, labels, planes, axes, corners_of)
+    _drop_unfit(vertices, planes, axes, rims, strips)
+    return _joined(vertices, labels, planes, axes, rims, strips, corners_of)
+
+
+def sculpted_triangles(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    labels: NDArray[np.int32],
+    planes: Sequence[Plane],
+    axes: Sequence[Axis],
+) -> NDArray[np.bool_]:
+    """Triangles that come from the model's own surface: neither cut along the lattice nor turned.
+
+    Parameters
+    ----------
+    vertices, faces, labels, planes, axes
+        As for :func:`round_regions`.
+
+    Returns
+    -------
+    (f,) bool array
+    """
+    corners_of = _corners_by_region(faces, labels, len(planes))
+    kept = np.array([max(abs(v) for v in plane.normal) > 1.0 - 1e-9 for plane in planes])
+    kept[list(_strips(vertices, faces, labels, planes, axes, corners_of))] = True
+    return ~kept[labels]
+
+
+def _strips(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    labels: NDArray[np.int32],
+    planes: Sequence[Plane],
+    axes: Sequence[Axis],
+    corners_of: list[NDArray[np.int32]],
+) -> Strips:
+    """Regions that may stand for a piece of a cylinder or cone about one of the axes."""
+    strips: Strips = {}
     for index, axis in enumerate(axes):
         near = _regions_near(vertices, faces, labels, axis)
         for region in near:
@@ -223,8 +273,7 @@ def round_regions(
             found = _strip(vertices[corners_of[region]], np.asarray(planes[region].normal), axis)
             if found is not None:
                 strips[region] = (index, *found)
-    _drop_unfit(vertices, planes, axes, rims, strips)
-    return _joined(vertices, labels, planes, axes, rims, strips, corners_of)
+    return strips
 
 
 Rims = dict[tuple[int, int], list[tuple[int, int]]]
@@ -261,7 +310,7 @@ def _square(plane: Plane, axis: Axis) -> bool:
     return abs(abs(plane.normal[axis.direction]) - 1.0) < 1e-6
 
 
-def _same(one: tuple[int, float, float, bool], other: tuple[int, float, float, bool]) -> bool:
+def _same(one: Strip, other: Strip) -> bool:
     return (
         one[0] == other[0]
         and one[3] == other[3]
@@ -275,7 +324,7 @@ def _drop_unfit(
     planes: Sequence[Plane],
     axes: Sequence[Axis],
     rims: Rims,
-    strips: dict[int, tuple[int, float, float, bool]],
+    strips: Strips,
 ) -> None:
     """Take out strips whose rim cannot follow the round surface, until none is left to take."""
     beside: dict[int, list[int]] = {}
@@ -311,13 +360,32 @@ def _drop_unfit(
             queue.extend(other for other in sorted(beside[region]) if other in strips)
 
 
+def _drop_lonely(beside: dict[int, list[int]], strips: Strips) -> None:
+    """Take out runs of fewer than three strips: too few to tell a round face from a chamfer."""
+    seen: set[int] = set()
+    for seed in sorted(strips):
+        if seed in seen:
+            continue
+        seen.add(seed)
+        run, queue = [seed], deque([seed])
+        while queue:
+            for other in beside[queue.popleft()]:
+                if other in strips and other not in seen and _same(strips[seed], strips[other]):
+                    seen.add(other)
+                    run.append(other)
+                    queue.append(other)
+        if len(run) < 3:
+            for region in run:
+                del strips[region]
+
+
 def _joined(
     vertices: NDArray[np.float64],
     labels: NDArray[np.int32],
     planes: Sequence[Plane],
     axes: Sequence[Axis],
     rims: Rims,
-    strips: dict[int, tuple[int, float, float, bool]],
+    strips: Strips,
     corners_of: list[NDArray[np.int32]],
 ) -> tuple[NDArray[np.int32], list[Surface]]:
     """Flood strips of one surface together, keeping each face to less than a full turn."""
@@ -330,6 +398,7 @@ def _joined(
         _, angle, _ = _polar(vertices[corners_of[region]].mean(axis=0), axes[strips[region][0]])
         return int(angle > 0.0)
 
+    _drop_lonely(beside, strips)
     group: dict[int, int] = {}
     members: list[list[int]] = []
     for seed in sorted(strips):

@@ -1,6 +1,7 @@
 """STEP: the bodies as named solids in shape A, with true cylinders and cones at the hinges.
 
-A body's mesh is turned into faces (see :mod:`fabfold.export.regions`), written as STEP text, read
+A body's mesh is thinned where it is sculpted, turned into faces (see
+:mod:`fabfold.export.regions`), written as STEP text, read
 back with the CAD kernel, and compared with the mesh. A body whose solid is not valid, or differs
 from its mesh, is written again with flat faces only, and then triangle by triangle.
 """
@@ -17,8 +18,16 @@ from numpy.typing import NDArray
 from fabfold.errors import GeometryError
 from fabfold.export.brep import Brep, brep_of
 from fabfold.export.colours import body_colours, palette
-from fabfold.export.regions import Axis, Plane, Surface, flat_regions, round_regions
+from fabfold.export.regions import (
+    Axis,
+    Plane,
+    Surface,
+    flat_regions,
+    round_regions,
+    sculpted_triangles,
+)
 from fabfold.export.steptext import StepSolid, step_text
+from fabfold.export.thin import thinned
 from fabfold.export.weld import weld
 from fabfold.files import write_text
 from fabfold.joinery.model import BodyMesh, Joinery
@@ -30,6 +39,8 @@ __all__ = ["StepFacts", "write_step"]
 
 #: A solid's volume may differ from its mesh's by this share before it is written again.
 VOLUME_SHARE = 0.01
+#: Sculpted surfaces may be thinned to within this share of the voxel side.
+THIN_SHARE = 0.003
 _LEVELS = ("round", "flat", "triangles")
 
 
@@ -57,17 +68,29 @@ class StepFacts:
     volume_mm3: float
 
 
-def hinge_axes(joinery: Joinery, tree: FoldTree) -> list[list[Axis]]:
-    """Axes of the hinges at each body, in mm."""
+def barrel_axes(joinery: Joinery, tree: FoldTree) -> list[list[Axis]]:
+    """Lines on which barrels lie or come to rest, for each body: the lattice edges of its cells."""
     origin = np.asarray(joinery.origin_mm, dtype=float)
     reach = 1.5 * (joinery.barrel_radius_mm + joinery.clearance_mm)
-    found: list[list[Axis]] = [[] for _ in tree.bodies]
-    for hinge in tree.hinges:
-        x, y, z = (origin + joinery.voxel_mm * np.asarray(hinge.point)).tolist()
-        along = int(np.abs(hinge.direction).argmax())
-        axis = Axis((x, y, z), along, 0.5 * joinery.voxel_mm, reach)
-        found[hinge.parent].append(axis)
-        found[hinge.child].append(axis)
+    found: list[list[Axis]] = []
+    for body in tree.bodies:
+        voxels = list(body.voxels)
+        if not voxels and body.edge is not None:
+            voxels = [tree.edges[body.edge].parent, tree.edges[body.edge].child]
+        lines: set[tuple[float, ...]] = set()
+        for cell in tree.source[voxels].tolist():
+            for along in range(3):
+                for side in (-0.5, 0.5):
+                    for other in (-0.5, 0.5):
+                        middle = [float(value) for value in cell]
+                        middle[(along + 1) % 3] += side
+                        middle[(along + 2) % 3] += other
+                        lines.add((along, *middle))
+        axes = []
+        for direction, *point in sorted(lines):
+            x, y, z = (origin + joinery.voxel_mm * np.array(point)).tolist()
+            axes.append(Axis((x, y, z), int(direction), 0.5 * joinery.voxel_mm, reach))
+        found.append(axes)
     return found
 
 
@@ -88,7 +111,7 @@ def write_step(
         Ends in ``.step``.
     joinery : Joinery
     tree : FoldTree, optional
-        Tells where the hinges are; without it every face is flat.
+        Tells where the hinges are; without it every face is flat, and none is thinned.
     title : str, optional
         Name of the assembly; the file's stem by default.
     colours : (b, 3) uint8 array, optional
@@ -109,13 +132,15 @@ def write_step(
     told = progress or SilentProgress()
     if colours is None:
         colours = palette(len(joinery.bodies)) if tree is None else body_colours(tree)
-    axes = hinge_axes(joinery, tree) if tree is not None else [[] for _ in joinery.bodies]
+    # Without the tree nothing tells barrels from sculpted surfaces, so nothing is thinned.
+    thin_mm = THIN_SHARE * joinery.voxel_mm if tree is not None else 0.0
+    axes = barrel_axes(joinery, tree) if tree is not None else [[] for _ in joinery.bodies]
     application = f"fabfold {__version__}"
     solids, plain, volume = [], [], 0.0
     for index, body in enumerate(joinery.bodies):
         told.update(index / len(joinery.bodies), body.name)
         red, green, blue = (int(value) for value in colours[index])
-        brep, level, measured = _sound_brep(body, axes[index], application)
+        brep, level, measured = _sound_brep(body, axes[index], thin_mm, application)
         solids.append(StepSolid(body.name, brep, (red, green, blue)))
         volume += measured
         if level != _LEVELS[0]:
@@ -132,13 +157,15 @@ def write_step(
     )
 
 
-def _sound_brep(body: BodyMesh, axes: list[Axis], application: str) -> tuple[Brep, str, float]:
+def _sound_brep(
+    body: BodyMesh, axes: list[Axis], thin_mm: float, application: str
+) -> tuple[Brep, str, float]:
     """The best faces whose solid is valid and has the mesh's volume."""
     wanted = mesh_volume(body.vertices, body.faces)
     faults = []
     for level in _LEVELS:
         try:
-            brep = _brep(body, axes, level)
+            brep = _brep(body, axes, level, thin_mm)
             valid, volume = _measured(
                 step_text([StepSolid(body.name, brep, (0, 0, 0))], body.name, application)
             )
@@ -154,7 +181,7 @@ def _sound_brep(body: BodyMesh, axes: list[Axis], application: str) -> tuple[Bre
     )
 
 
-def _brep(body: BodyMesh, axes: list[Axis], level: str) -> Brep:
+def _brep(body: BodyMesh, axes: list[Axis], level: str, thin_mm: float) -> Brep:
     vertices, faces = body.vertices, body.faces
     if level == "triangles":
         points, faces = weld(vertices, faces)
@@ -171,6 +198,10 @@ def _brep(body: BodyMesh, axes: list[Axis], level: str) -> Brep:
             )
         return brep_of(vertices, faces, labels, surfaces)
     labels, planes = flat_regions(vertices, faces)
+    if thin_mm > 0:
+        sculpted = sculpted_triangles(vertices, faces, labels, planes, axes)
+        vertices, faces = thinned(vertices, faces, sculpted, thin_mm)
+        labels, planes = flat_regions(vertices, faces)
     surfaces = list(planes)
     if level == "round":
         labels, surfaces = round_regions(vertices, faces, labels, planes, axes)
