@@ -32,14 +32,18 @@ _HOMES = {
     "Leaf": "leaf",
     "MagnetPocket": "retention",
     "Play": "play",
+    "play": "play",
     "RodPin": "hardware",
     "ScrewPin": "hardware",
     "SingleHinge": "single",
     "SnapDimple": "retention",
     "SnapTongue": "retention",
+    "Magnet": "retention",
+    "SnapSpec": "retention",
     "Stops": "stops",
     "StraightPin": "pins",
     "hinge_location": "single",
+    "write_coupon": "coupon",
 }
 
 __all__ = sorted(_HOMES)  # noqa: PLE0605
@@ -49,7 +53,13 @@ def __getattr__(name: str) -> Any:
     """Import a public name on first use."""
     if name not in _HOMES:
         raise AttributeError(f"module 'hinges' has no attribute {name!r}")
-    value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    try:
+        value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    except ImportError:
+        from .kernel import check_kernel
+
+        check_kernel()  # says how to mend an environment in which two kernels overwrote each other
+        raise
     globals()[name] = value
     return value
 

@@ -9,7 +9,7 @@ from typing import Final, Literal
 from .clearance import Clearance
 from .errors import HingeError
 from .fit import at_least
-from .pins import Owned, Pin, Roof, ring
+from .pins import Owned, Pin, Ring, Roof, ring
 from .shapes import Point, Shape, Turned, cylinder, regular
 from .train import Train
 
@@ -52,6 +52,16 @@ SCREWS: Final[dict[str, Screw]] = {
     )
 }
 """The screws that hinges of this size are pinned with."""
+
+
+def loose_rings(train: Train, radius: float, room: float) -> tuple[Ring, ...]:
+    """Both ends of the bores of the knuckles that are not the holder's."""
+    return tuple(
+        Ring(z, radius, (1.0, 0.0), room)
+        for span in train.spans
+        if span.owner != train.holder
+        for z in (span.start, span.end)
+    )
 
 
 @dataclass(frozen=True)
@@ -151,6 +161,10 @@ class LoosePin(Pin):
             for ends in ((train.start, -edge), (train.end, edge))
             if abs(ends[1] - ends[0]) > 1e-6
         )
+
+    def rings(self, train: Train) -> tuple[Ring, ...]:
+        """Both ends of every bore; the pin's room on both sides counts."""
+        return loose_rings(train, 0.5 * self.diameter, self.grip + self.slip)
 
     def hardware(self, train: Train) -> tuple[Shape, ...]:
         """Draw the pin."""
@@ -341,6 +355,11 @@ class ScrewPin(Pin):
         if self.sunk:
             return 0.0
         return (self.screw.cap_height if head else self.screw.nut_height) + self._ROOM
+
+    def rings(self, train: Train) -> tuple[Ring, ...]:
+        """Both ends of every bore; the screw's room on both sides counts."""
+        radius = 0.5 * self.screw.diameter
+        return loose_rings(train, radius, 2.0 * (0.5 * self.screw.clear - radius))
 
     def hardware(self, train: Train) -> tuple[Shape, ...]:
         """Draw the screw, and its nut."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from math import cos, radians, tan
+from math import cos, radians, sin, tan
 from typing import Literal
 
 from .clearance import Clearance
@@ -18,7 +18,7 @@ from .fit import at_least
 from .shapes import Point, Prism, Shape, Turned, regular, teardrop
 from .train import Span, Train
 
-__all__ = ["ConePin", "Pin", "Roof", "StraightPin"]
+__all__ = ["ConePin", "Pin", "Ring", "Roof", "StraightPin"]
 
 Owned = tuple[int, Shape]
 _SLOPE = 2.0**0.5
@@ -60,6 +60,26 @@ class Roof:
         return ()
 
 
+@dataclass(frozen=True)
+class Ring:
+    """A circle on the holder's pin and how near the bore around it is, for play.
+
+    Attributes
+    ----------
+    z, radius : float
+        In mm.
+    normal : (radial, axial) float
+        Outward normal of the pin's surface.
+    gap : float
+        To the facing surface, in mm.
+    """
+
+    z: float
+    radius: float
+    normal: tuple[float, float]
+    gap: float
+
+
 class Pin(ABC):
     """What every kind of pin tells the hinge."""
 
@@ -78,6 +98,10 @@ class Pin(ABC):
     @abstractmethod
     def thinnest_barrel(self, clearance: Clearance, wall: float, knuckles: int) -> float:
         """Smallest barrel radius in mm that leaves `wall` around the pin."""
+
+    @abstractmethod
+    def rings(self, train: Train) -> tuple[Ring, ...]:
+        """Where pin and bores face one another, for :func:`hinges.play.play`."""
 
     def bores(self, train: Train, roof: Roof) -> tuple[Owned, ...]:
         """Give what is cut out of the finished halves: roofs, nut pockets."""
@@ -260,6 +284,18 @@ class ConePin(Pin):
             for index, span in enumerate(train.spans)
         )
 
+    def rings(self, train: Train) -> tuple[Ring, ...]:
+        """Foot and tip of every cone."""
+        slope = radians(self.angle)
+        gap = train.clearance.radial
+        made = []
+        for one, after in zip(train.spans, train.spans[1:], strict=False):
+            face, up = (one.end, 1.0) if one.owner == train.holder else (after.start, -1.0)
+            normal = (cos(slope), up * sin(slope))
+            made.append(Ring(face, self.radius, normal, gap))
+            made.append(Ring(face + up * self.height, self.tip, normal, gap))
+        return tuple(made)
+
 
 @dataclass(frozen=True)
 class StraightPin(Pin):
@@ -357,3 +393,18 @@ class StraightPin(Pin):
             if span.owner != train.holder
             for roof_shape in roof.over(radius, span)
         )
+
+    def rings(self, train: Train) -> tuple[Ring, ...]:
+        """Both ends of every bore, and the flare of a head."""
+        gap, head = train.clearance.radial, self._head(train.clearance)
+        made = []
+        last = len(train.spans) - 1
+        for index, span in enumerate(train.spans):
+            if span.owner == train.holder:
+                continue
+            made += [Ring(z, self.radius, (1.0, 0.0), gap) for z in (span.start, span.end)]
+            for outer, face, up in ((index == 0, span.start, 1.0), (index == last, span.end, -1.0)):
+                if outer:
+                    normal = (0.5**0.5, up * 0.5**0.5)
+                    made.append(Ring(face, self.radius + head, normal, gap))
+        return tuple(made)

@@ -1,0 +1,235 @@
+"""Hinges for CadQuery: methods of ``Workplane``, and plain functions for ``invoke`` and ``apply``.
+
+Importing this module registers the methods; a name that ``Workplane`` already has is left alone.
+
+>>> import cadquery as cq
+>>> import hinges.cadquery
+>>> hinge = cq.Workplane().singleHinge(20, clearance=0.3)
+>>> hinge.solids().size()
+2
+
+==================================  ===============================================================
+method                              what it does at every point of the stack
+==================================  ===============================================================
+``singleHinge(length, ...)``        adds both halves
+``doubleHinge(size, ...)``          adds all three bodies
+``hingeParent(length, ...)``        lets the parent's half into the solid under construction
+``hingeChild(length, ...)``         lets the child's half into it
+``hingeHalf(side, length, ...)``    adds one half without cutting
+``cutHinge(side, length, ...)``     cuts what one body gives up
+==================================  ===============================================================
+
+The hinge's axis is the local z of each point, x points from parent to child and y out of the face
+that they share; see :class:`hinges.SingleHinge` for the other parameters. Shapes pass both ways as
+handles of the one kernel: nothing is copied or written to disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from .errors import HingeError
+from .kernel import check_kernel
+
+check_kernel(cadquery=True)
+
+import cadquery as cq  # noqa: E402
+
+__all__ = [
+    "METHODS",
+    "child_of",
+    "from_cadquery",
+    "hinge_at",
+    "parent_of",
+    "to_cadquery",
+]
+
+
+def to_cadquery(part: Any) -> cq.Shape:
+    """Hand a build123d shape to CadQuery.
+
+    Parameters
+    ----------
+    part : build123d Shape
+
+    Returns
+    -------
+    cadquery Shape
+        Of the matching class, on the same kernel object. A part of one solid comes as a Solid.
+    """
+    solids = part.solids() if hasattr(part, "solids") else []
+    return cq.Shape.cast(solids[0].wrapped if len(solids) == 1 else part.wrapped)
+
+
+def from_cadquery(shape: Any) -> Any:
+    """Hand a CadQuery shape, or the solids of a Workplane, to build123d.
+
+    Parameters
+    ----------
+    shape : cadquery Shape or Workplane
+
+    Returns
+    -------
+    build123d Part
+        On the same kernel objects.
+
+    Raises
+    ------
+    HingeError
+        If there is no solid in it.
+    """
+    import build123d as bd
+
+    if isinstance(shape, cq.Workplane):
+        solids = [one for value in shape.vals() if isinstance(value, cq.Shape) for one in value]
+        found = [solid for one in solids for solid in one.Solids()] or [
+            solid for value in shape.vals() for solid in value.Solids()
+        ]
+    else:
+        found = shape.Solids()
+    if not found:
+        raise HingeError("there is no solid in this CadQuery shape")
+    return bd.Part([bd.Solid(solid.wrapped) for solid in found])
+
+
+def _single(length: float, options: dict[str, Any]) -> Any:
+    from build123d import Mode
+
+    from .single import SingleHinge
+
+    return SingleHinge(length, mode=Mode.PRIVATE, **options)
+
+
+def _whole(hinge: Any) -> cq.Compound:
+    return cq.Compound.makeCompound([cq.Solid(solid.wrapped) for solid in hinge.solids()])
+
+
+def _pieces(part: Any) -> list[cq.Shape]:
+    return [cq.Solid(solid.wrapped) for solid in part.solids()]
+
+
+def _half_and_carve(side: str, length: float, options: dict[str, Any]) -> tuple[Any, Any]:
+    hinge = _single(length, options)
+    if side == "parent":
+        return hinge.parent_half, hinge.parent_carve
+    if side == "child":
+        return hinge.child_half, hinge.child_carve
+    raise HingeError(f"side {side!r}: use 'parent' or 'child'")
+
+
+def single_hinge(
+    self: cq.Workplane, length: float, combine: bool = True, clean: bool = True, **options: Any
+) -> cq.Workplane:
+    """Add both halves of a single hinge at every point of the stack."""
+    whole = _whole(_single(length, options))
+    return self.eachpoint(whole.moved, True, combine, clean)
+
+
+def double_hinge(
+    self: cq.Workplane, size: float, combine: bool = True, clean: bool = True, **options: Any
+) -> cq.Workplane:
+    """Add the three bodies of a double hinge at every point of the stack."""
+    from build123d import Mode
+
+    from .double import DoubleHinge
+
+    whole = _whole(DoubleHinge(size, mode=Mode.PRIVATE, **options))
+    return self.eachpoint(whole.moved, True, combine, clean)
+
+
+def hinge_half(
+    self: cq.Workplane,
+    side: str,
+    length: float,
+    combine: bool = True,
+    clean: bool = True,
+    **options: Any,
+) -> cq.Workplane:
+    """Add one half, "parent" or "child", at every point of the stack."""
+    half = to_cadquery(_half_and_carve(side, length, options)[0])
+    return self.eachpoint(half.moved, True, combine, clean)
+
+
+def cut_hinge(
+    self: cq.Workplane, side: str, length: float, clean: bool = True, **options: Any
+) -> cq.Workplane:
+    """Cut what a body gives up to a hinge at every point of the stack."""
+    pieces = _pieces(_half_and_carve(side, length, options)[1])
+    cutter = cq.Compound.makeCompound(pieces)
+    return self.eachpoint(cutter.moved, True, "cut", clean)
+
+
+def _fitted(self: cq.Workplane, side: str, length: float, options: dict[str, Any]) -> cq.Workplane:
+    half, carve = _half_and_carve(side, length, options)
+    cutters, added = _pieces(carve), _pieces(half)
+    body = self.findSolid()
+    before = len(body.Solids())
+    # Each point of the stack, in global coordinates, as a place for the hinge.
+    places = [
+        location
+        for shape in self.eachpoint(
+            lambda place: cq.Vertex.makeVertex(0, 0, 0).moved(place), True
+        ).vals()
+        for location in [shape.location()]
+    ]
+    for place in places:
+        body = body.cut(*(piece.moved(place) for piece in cutters))
+        body = body.fuse(*(piece.moved(place) for piece in added))
+    if len(body.Solids()) != before:
+        raise HingeError(
+            f"the {side} body came out in {len(body.Solids())} pieces instead of {before}: it must "
+            "reach the bracket of its half, and the carve must not cut it in two"
+        )
+    solids = body.Solids()
+    return self.newObject([solids[0] if len(solids) == 1 else body])
+
+
+def hinge_parent(self: cq.Workplane, length: float, **options: Any) -> cq.Workplane:
+    """Let the parent's half into the solid under construction at every point of the stack."""
+    return _fitted(self, "parent", length, options)
+
+
+def hinge_child(self: cq.Workplane, length: float, **options: Any) -> cq.Workplane:
+    """Let the child's half into the solid under construction at every point of the stack."""
+    return _fitted(self, "child", length, options)
+
+
+def parent_of(length: float, **options: Any) -> Callable[[cq.Workplane], cq.Workplane]:
+    """Make a function for ``Workplane.invoke`` that lets the parent's half in."""
+    return lambda workplane: hinge_parent(workplane, length, **options)
+
+
+def child_of(length: float, **options: Any) -> Callable[[cq.Workplane], cq.Workplane]:
+    """Make a function for ``Workplane.invoke`` that lets the child's half in."""
+    return lambda workplane: hinge_child(workplane, length, **options)
+
+
+def hinge_at(length: float, **options: Any) -> Callable[[Iterable[Any]], list[cq.Shape]]:
+    """Make a function for ``Workplane.apply``: every object on the stack becomes a hinge.
+
+    A location is taken as it is, any other object by its centre.
+    """
+
+    def build(objects: Iterable[Any]) -> list[cq.Shape]:
+        whole = _whole(_single(length, options))
+        places = (
+            one if isinstance(one, cq.Location) else cq.Location(one.Center()) for one in objects
+        )
+        return [whole.moved(place) for place in places]
+
+    return build
+
+
+METHODS: dict[str, Callable[..., cq.Workplane]] = {
+    "singleHinge": single_hinge,
+    "doubleHinge": double_hinge,
+    "hingeHalf": hinge_half,
+    "hingeParent": hinge_parent,
+    "hingeChild": hinge_child,
+    "cutHinge": cut_hinge,
+}
+
+for _name, _method in METHODS.items():
+    if not hasattr(cq.Workplane, _name):
+        setattr(cq.Workplane, _name, _method)
