@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import CheckError
 from fabfold.fold.bvh import Boxes, empty_boxes, refit
-from fabfold.fold.gap import FAILED, UNPROVEN, sweep_pairs
+from fabfold.fold.gap import FAILED, UNPROVEN, least_gap, sweep_pairs
 from fabfold.fold.model import Motion
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.model import FoldTree
@@ -25,6 +25,7 @@ __all__ = ["certify", "end_pose_error"]
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
+_START = "shape A"
 
 
 def end_pose_error(tree: FoldTree, angles_deg: F64) -> float:
@@ -157,26 +158,30 @@ def _check_nesting(names: Sequence[str], meshes: Sequence[tuple[F64, I32]]) -> N
             for point in points[((points > low) & (points < high)).all(axis=1)]:
                 if _inside(point, np.asarray(vertices, dtype=float)[np.asarray(faces)]):
                     raise CheckError(
-                        f"shape A: {names[inner]} lies inside {names[outer]} at "
+                        f"{_START}: {names[inner]} lies inside {names[outer]} at "
                         f"{np.round(point, 3).tolist()} mm; two bodies may not share material"
                     )
 
 
 def _refuse(
-    verdict: int, where: str, names: Sequence[str], pair: I32, result: F64, wanted: float
+    verdict: int, where: str, bodies: _Bodies, pair: I32, result: F64, asked: float
 ) -> None:
-    a, b = (names[int(i)] for i in pair)
-    angle = f"{math.degrees(result[2]):.3f}°"
+    """Raise for a proof that failed; the boxes are still where it failed."""
+    a, b = (bodies.names[int(i)] for i in pair)
+    angle = f"at {math.degrees(result[2]):.3f}° of the move, " if where != _START else ""
     if verdict == FAILED:
+        # The proof stops at the first distance that is too small: say the smallest at that angle.
+        least = np.array([result[0], np.inf, 0.0])
+        least_gap(bodies.boxes, pair[0], pair[1], result[2], result[2], -1.0, 1e-9, least)
+        told = "run into each other" if least[0] <= 0 else f"come within {max(least[0], 0):.4f} mm"
         raise CheckError(
-            f"{where}: {a} and {b} come within {result[0]:.4f} mm at {angle} of the move, "
-            f"less than the {wanted:g} mm asked for; more clearance, deeper grooves or another "
-            "tree is needed"
+            f"{where}: {a} and {b} {told} {angle}less than the {asked:g} mm "
+            "asked for; more clearance, deeper grooves or another tree is needed"
         )
     if verdict == UNPROVEN:
         raise CheckError(
-            f"{where}: a gap of {wanted:g} mm between {a} and {b} cannot be proven near {angle} "
-            "of the move; ask for a slightly smaller gap"
+            f"{where}: a gap of {asked:g} mm between {a} and {b} cannot be proven {angle}"
+            "ask for a slightly smaller gap"
         )
 
 
@@ -252,7 +257,7 @@ def certify(
     pair = np.zeros(2, dtype=np.int32)
     result = np.array([ceiling, np.inf, 0.0])
     verdict = sweep_pairs(bodies.boxes, everyone, everyone, 0.0, 0.0, wanted, 1e-6, result, pair)
-    _refuse(verdict, "shape A", bodies.names, pair, result, min_gap_mm)
+    _refuse(verdict, _START, bodies, pair, result, min_gap_mm)
     _check_nesting(bodies.names, meshes)
     seen = float(result[0])
     proven = min(ceiling, float(result[1]))
@@ -331,5 +336,5 @@ def _move(
         verdict = sweep_pairs(
             bodies.boxes, turning, resting, ends[0], ends[1], wanted, slack, result, pair
         )
-        _refuse(verdict, where, bodies.names, pair, result, asked)
+        _refuse(verdict, where, bodies, pair, result, asked)
     return result
