@@ -143,10 +143,10 @@ def main() -> None:
         print(json.dumps(run_one(source, template, Path(kit))))
         return
 
-    from fabfold.solid.samples import SAMPLES
+    from fabfold.solid.samples import sample, sample_names
 
     jobs = {n: (str(options.models / m[0]), m[1]) for n, m in MODELS.items()}
-    jobs |= {f"sample:{n}": (f"sample:{n}", s.template) for n, s in SAMPLES.items()}
+    jobs |= {f"sample:{n}": (f"sample:{n}", sample(n).template) for n in sample_names()}
     memory = HERE / "paper_table.json"
     rows = json.loads(memory.read_text()) if memory.is_file() else {}
     for name in options.names or jobs:

@@ -62,9 +62,11 @@ class ConsoleListener:
                 TextColumn("{task.description}", markup=False),
             )
             try:
-                with RichProgress(*columns, console=self._console) as self._bars:
-                    with _bar(self._bars, title) as bar:
-                        yield bar
+                with (
+                    RichProgress(*columns, console=self._console) as self._bars,
+                    _bar(self._bars, title) as bar,
+                ):
+                    yield bar
             finally:
                 self._bars = None
 
@@ -150,11 +152,11 @@ def show_list(what: str) -> None:
     """
     console = Console()
     if what == "samples":
-        from fabfold.solid.samples import SAMPLES
+        from fabfold.solid.samples import sample, sample_names
 
         table = Table("sample", "template", "what it is", box=None)
-        for name, sample in SAMPLES.items():
-            table.add_row(f"sample:{name}", sample.template, sample.description)
+        for known in map(sample, sample_names()):
+            table.add_row(f"sample:{known.name}", known.template, known.title)
     elif what == "templates":
         from fabfold.lattice import load_template, template_names
 

@@ -256,11 +256,11 @@ class Kit:
 
     def run(self, stage: str) -> None:
         """Run one stage by name, with all before it that is missing, and write its kit files."""
-        from fabfold import writing
-
         result = getattr(self, stage)()
         if self.folder is None or stage in ("solid", "voxelize", "export"):
             return
+        from fabfold import writing
+
         if stage == "fit":
             result = self.fold()
         if isinstance(result, Attempt):

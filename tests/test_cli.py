@@ -1,0 +1,98 @@
+"""The command line as a user meets it: exit codes, sentences, quickness."""
+
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = (
+    "build123d",
+    "cadquery",
+    "OCP",
+    "mujoco",
+    "pymeshlab",
+    "trimesh",
+    "numba",
+    "scipy",
+    "lib3mf",
+)
+
+
+def fabfold(*arguments, cwd=None):
+    return subprocess.run(
+        [sys.executable, "-m", "fabfold", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
+    )
+
+
+def test_help_imports_no_cad_package():
+    code = (
+        "import sys\n"
+        "from fabfold.cli import main\n"
+        "try:\n    main(['--help'])\n"
+        "except SystemExit as stop:\n    assert not stop.code\n"
+        f"loaded = sorted(set(sys.modules) & set({HEAVY!r}))\n"
+        "print('LOADED', loaded, file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "export" in done.stdout
+    assert "LOADED []" in done.stderr
+
+
+def test_every_stage_is_a_command():
+    text = fabfold("--help").stdout
+    for command in ("voxelize", "fit", "fold", "join", "check", "export", "list"):
+        assert f"  {command} " in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["export", "gone.stl"], ["gone.stl", "no such file"]),
+        (["export", "sample:unicorn"], ["unicorn", "car"]),
+        (["export", "sample:car", "--template", "pyramid"], ["pyramid", "box-AxBxC"]),
+        (["export", "sample:car", "--voxel-mm", "-3"], ["voxel_mm"]),
+        (["export", "sample:car", "--rotation", "1,2"], ["--rotation", "three numbers"]),
+        (["export", "sample:car", "--effort", "heroic"], ["effort", "thorough"]),
+        (["export", "sample:car", "--profile", "clay"], ["clay"]),
+        (["export", "."], ["kit.toml"]),
+        (["list", "dragons"], ["dragons", "samples"]),
+        (["expor"], ["expor"]),
+    ],
+)
+def test_bad_usage_is_one_sentence_and_exit_code_2(tmp_path, arguments, words):
+    done = fabfold(*arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    for word in words:
+        assert word in done.stderr
+    assert not list(tmp_path.rglob("*.json")), "nothing is half written"
+
+
+def test_a_broken_model_is_refused_with_exit_code_2(tmp_path):
+    (tmp_path / "broken.stl").write_bytes(b"")
+    done = fabfold("export", "broken.stl", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "broken.stl" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_folder_with_other_things_is_left_alone(tmp_path):
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "cat.jpg").write_text("meow")
+    done = fabfold("export", "sample:car", "-o", "photos", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "photos" in done.stderr
+    assert [p.name for p in (tmp_path / "photos").iterdir()] == ["cat.jpg"]
+
+
+@pytest.mark.parametrize("what", ["samples", "templates", "profiles"])
+def test_lists(what):
+    done = fabfold("list", what)
+    assert done.returncode == 0, done.stderr
+    assert {"samples": "sample:car", "templates": "box-AxBxC", "profiles": "mjf-pa12"}[what] in (
+        done.stdout
+    )

@@ -1,0 +1,180 @@
+"""Whole kits of a small model: what a user gets, twice the same, stopped and gone on."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import trimesh
+
+from fabfold.errors import KitError, ModelError, NoSolutionError, RecipeError
+from fabfold.fold.model import Motion
+from fabfold.kit import Kit, open_kit
+from fabfold.tree.model import FoldTree
+
+OPTIONS = {"template": "box-2x2x2", "effort": "quick", "seed": 3}
+
+
+@pytest.fixture(scope="module")
+def bar(tmp_path_factory):
+    """A chunky bar that is eight voxels long."""
+    path = tmp_path_factory.mktemp("model") / "bar.stl"
+    mesh = trimesh.creation.box((80.0, 9.6, 9.6))
+    mesh.export(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def kit(bar, tmp_path_factory):
+    """The bar's kit, exported."""
+    kit = Kit.from_model(bar, folder=tmp_path_factory.mktemp("kit") / "bar-kit", **OPTIONS)
+    kit.export()
+    return kit
+
+
+def files_of(folder):
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def test_a_kit_has_every_file(kit):
+    names = {str(path.relative_to(kit.folder)) for path in kit.folder.rglob("*")}
+    wanted = {"kit.toml", "tree.json", "motion.json", "bar.3mf", "bar.step", "fold.glb"}
+    assert wanted | {"report.json", "bodies/body-00.stl"} <= names
+    assert not [name for name in names if ".part-" in name]
+
+
+def test_the_bar_folds_into_the_box(kit):
+    tree = FoldTree.from_json(json.loads((kit.folder / "tree.json").read_text()))
+    motion = Motion.from_json(json.loads((kit.folder / "motion.json").read_text()))
+    assert len(tree.source) == 8
+    assert {tuple(cell) for cell in tree.target} == {tuple(c) for c in tree.template.cells}
+    np.testing.assert_array_equal(motion.angles_deg[-1], tree.fold_angles)
+    assert motion.certificate["min_gap_mm"] >= kit.profile().min_gap_mm
+    assert len(motion.certificate["moves"]) == len(motion.moves) - 1
+
+
+def test_bodies_are_single_closed_pieces_as_many_as_in_the_tree(kit):
+    tree = kit.join().attempt.tree
+    paths = sorted((kit.folder / "bodies").glob("*.stl"))
+    assert [path.stem for path in paths] == sorted(body.name for body in tree.bodies)
+    for path in paths:
+        mesh = trimesh.load_mesh(path)
+        assert mesh.is_watertight
+        assert mesh.body_count == 1
+
+
+def test_every_check_passes_and_is_reported_with_its_figure(kit):
+    report = json.loads((kit.folder / "report.json").read_text())
+    assert report["format"] == "fabfold-report"
+    assert {check.name for check in kit.check()} == {c["name"] for c in report["checks"]}
+    assert all(check.ok for check in kit.check()), [c for c in kit.check() if not c.ok]
+
+
+def test_a_stage_done_is_read_not_made_again(kit):
+    class Refuse:
+        def stage(self, name):
+            raise AssertionError(f"stage {name} is made again")
+
+    again = open_kit(str(kit.folder))
+    again.listener = Refuse()
+    assert again.recipe == kit.recipe
+    made, old = again.join(), kit.join()
+    assert made.attempt.tree.to_json(20.0, (0, 0, 0)) == old.attempt.tree.to_json(20.0, (0, 0, 0))
+    assert made.joinery.notes == old.joinery.notes
+    for one, other in zip(made.joinery.bodies, old.joinery.bodies, strict=True):
+        np.testing.assert_array_equal(one.vertices, other.vertices)
+        np.testing.assert_array_equal(one.faces, other.faces)
+    assert again.check() == kit.check()
+    assert again.solid().notes == kit.solid().notes
+
+
+def test_the_recipe_makes_the_same_bytes_with_another_number_of_workers(kit, tmp_path):
+    other = open_kit(str(kit.folder / "kit.toml"), folder=tmp_path / "other", workers=1)
+    other.export()
+    first, second = files_of(kit.folder), files_of(tmp_path / "other")
+    assert sorted(first) == sorted(second)
+    assert [name for name in first if first[name] != second[name]] == []
+
+
+def test_a_changed_recipe_makes_only_what_depends_on_it(kit):
+    kit_again = open_kit(str(kit.folder), voxel_mm=30.0)
+    made = []
+
+    class Listen:
+        def stage(self, name):
+            made.append(name)
+            raise KeyboardInterrupt
+
+    kit_again.listener = Listen()
+    with pytest.raises(KeyboardInterrupt):
+        kit_again.join()
+    assert made == ["join"]
+
+
+def test_without_a_folder_nothing_is_written(bar, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    kit = Kit.from_model(bar, **OPTIONS)
+    voxels = kit.voxelize()[0]
+    assert len(voxels) == 8
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(KitError, match="folder"):
+        kit.export()
+
+
+def test_interrupt_leaves_what_is_done_and_goes_on(bar, tmp_path):
+    folder = tmp_path / "kit"
+    command = [sys.executable, "-m", "fabfold", "export", str(bar), "-o", str(folder)]
+    for key, value in OPTIONS.items():
+        command += [f"--{key}", str(value)]
+    run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    journal = folder / "stages" / "journal.json"
+    deadline = time.monotonic() + 120
+    while not (journal.is_file() and "voxelize" in journal.read_text()):
+        assert run.poll() is None and time.monotonic() < deadline, run.stderr.read()
+        time.sleep(0.02)
+    os.kill(run.pid, signal.SIGINT)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 130, err
+    assert "goes on from there" in err
+    assert "Traceback" not in err
+    assert not list(folder.rglob(".part-*"))
+
+    again = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert again.returncode == 0, again.stderr
+    assert "Cutting voxels" not in again.stderr
+    assert (folder / "report.json").is_file()
+
+
+def test_the_voxels_may_not_outnumber_the_template(bar):
+    kit = Kit.from_model(bar, template="box-1x1x1", pitch=10.0)
+    with pytest.raises(NoSolutionError, match=r"voxels|cells"):
+        kit.fit()
+
+
+def test_grid_placement_by_hand(bar):
+    kit = Kit.from_model(
+        bar, template="box-2x2x2", rotation=(0, 0, 90), pitch=10.0, origin=(0, -35.0, 0)
+    )
+    voxels = kit.voxelize()[0]
+    assert voxels.cells.tolist() == [[0, j, 0] for j in range(8)]
+    assert voxels.pitch == 10.0
+
+
+def test_a_recipe_without_its_model_says_where_to_put_it(kit, tmp_path):
+    recipe = tmp_path / "kit.toml"
+    recipe.write_text((kit.folder / "kit.toml").read_text())
+    with pytest.raises(ModelError, match=r"bar\.stl"):
+        open_kit(str(recipe), folder=tmp_path / "new")
+
+
+def test_bad_options_are_refused_by_name(bar):
+    with pytest.raises(RecipeError, match="colour"):
+        Kit.from_model(bar, colour="red")
