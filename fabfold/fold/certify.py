@@ -168,19 +168,19 @@ def _refuse(
 ) -> None:
     """Raise for a proof that failed; the boxes are still where it failed."""
     a, b = (bodies.names[int(i)] for i in pair)
-    angle = f"at {math.degrees(result[2]):.3f}° of the move, " if where != _START else ""
+    angle = f" at {math.degrees(result[2]):.3f}° of the move" if where != _START else ""
     if verdict == FAILED:
         # The proof stops at the first distance that is too small: say the smallest at that angle.
         least = np.array([result[0], np.inf, 0.0])
         least_gap(bodies.boxes, pair[0], pair[1], result[2], result[2], -1.0, 1e-9, least)
         told = "run into each other" if least[0] <= 0 else f"come within {max(least[0], 0):.4f} mm"
         raise CheckError(
-            f"{where}: {a} and {b} {told} {angle}less than the {asked:g} mm "
+            f"{where}: {a} and {b} {told}{angle}, less than the {asked:g} mm "
             "asked for; more clearance, deeper grooves or another tree is needed"
         )
     if verdict == UNPROVEN:
         raise CheckError(
-            f"{where}: a gap of {asked:g} mm between {a} and {b} cannot be proven {angle}"
+            f"{where}: a gap of {asked:g} mm between {a} and {b} cannot be proven{angle}; "
             "ask for a slightly smaller gap"
         )
 
