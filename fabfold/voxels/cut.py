@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.lattice import parity
+from fabfold.meshes import mesh_volume
 from fabfold.voxels.features import RIGID_CONTACT, components, face_pairs, main_contact
 from fabfold.voxels.model import SUBDIVISION, Voxels
 from fabfold.voxels.offsets import CellEnergy
@@ -146,6 +147,8 @@ def cut_voxels(
     share = fill[tuple(kept.T)]
     slivers = int((share < energy.sliver_below).sum())
     lost = total - float(share.sum())
+    moves = sum(float(((offsets * s) ** 2).sum()) for offsets in placement.offsets)
+    missed = abs(total - mesh_volume(warped, warped_faces))
     shift = placement.first + low
     voxels = Voxels(
         cells=(kept - low).astype(np.int32),
@@ -167,7 +170,13 @@ def cut_voxels(
             "fill": float(share.sum()),
             "slivers": float(slivers),
             "lost": lost,
-            "score": float(share.sum()) - energy.sliver_cost * slivers - energy.loss_cost * lost,
+            "moves": moves,
+            "missed": missed,
+            "score": float(share.sum())
+            - energy.sliver_cost * slivers
+            - energy.loss_cost * lost
+            - energy.move_cost * moves
+            - missed,
         },
     )
     return voxels, len(kept), 0

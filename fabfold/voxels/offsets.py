@@ -82,6 +82,10 @@ class Offsets:
     offsets: Planes
     energies: tuple[float, ...]
 
+    def effort(self, energy: CellEnergy) -> float:
+        """What the moves cost by themselves."""
+        return energy.move_cost * sum(float((axis**2).sum()) for axis in self.offsets)
+
 
 @njit(cache=True)
 def cell_energy(fill, drop_below, sliver_below, sliver_cost, loss_cost):  # type: ignore[no-untyped-def]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
@@ -45,6 +45,8 @@ class Verdict:
         Material in dropped cells, in cells.
     excess : int
         Kept cells for which the template has no cell of their colour.
+    fills : (kept,) float64 array
+        Share of each kept cell that is material, ascending.
     """
 
     score: float
@@ -53,6 +55,7 @@ class Verdict:
     slivers: int
     lost: float
     excess: int
+    fills: NDArray[np.float64] = field(repr=False, compare=False)
 
 
 def grid_rotations(count: int, seed: int, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -281,11 +284,16 @@ def judge(fills: NDArray[np.float64], energy: CellEnergy, capacity: Capacity) ->
         np.zeros(fills.size, dtype=np.int64),
         np.zeros(fills.shape, dtype=np.int32),
     )
-    return Verdict(float(found[0]), int(found[1]), float(found[2]), int(found[3]), *_tail(found))
-
-
-def _tail(found: tuple[float, ...]) -> tuple[float, int]:
-    return float(found[4]), int(found[5])
+    score, kept, fill, slivers, lost, excess = found
+    return Verdict(
+        score=float(score),
+        kept=int(kept),
+        fill=float(fill),
+        slivers=int(slivers),
+        lost=float(lost),
+        excess=int(excess),
+        fills=np.sort(fills[keep]),
+    )
 
 
 def rank_translations(

@@ -7,7 +7,7 @@ tried again at pitches in between.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from fabfold.progress import Progress
 from fabfold.solid.model import Solid
 from fabfold.voxels.cut import Placement
 from fabfold.voxels.model import SUBDIVISION
-from fabfold.voxels.offsets import CellEnergy, Planes, optimise_offsets
+from fabfold.voxels.offsets import CellEnergy, Offsets, optimise_offsets
 from fabfold.voxels.placement import Capacity, Verdict, judge, rank_translations
 from fabfold.voxels.scan import box_counts, summed_volume
 
@@ -32,8 +32,12 @@ _FINE_LIMIT = 40_000_000
 PITCHES = (17, 18, 19, 20, 21)
 #: Pitches of the third round, as shares of the best so far.
 NEARBY = (0.962, 0.975, 0.9875, 1.0125, 1.025)
+#: Taken off the score for a cell too many once the planes are moved: more than a full cell brings.
+_EXCESS_COST = 2.0
 #: Translations along each axis.
 _STEPS = 4
+#: Pitches added at most because they divide a side of the model evenly.
+_MOST_FITTED = 8
 #: Grids of a rotation whose planes are moved in the first round.
 _MOVED = 4
 
@@ -170,28 +174,48 @@ class Rounds:
         """Rank placements on coarse scans: the best two of each rotation, best first."""
         ranked: list[Ranked] = []
         count = len(self.rotations)
-        descending = np.sort(pitches)[::-1]
         for index in range(count):
-            table, side, low = self._coarse(index, float(descending[-1]) / _COARSE)
-            mine: list[tuple[float, float, int]] = []
-            for pitch in descending.tolist():
-                rows = rank_translations(table, pitch / side, _STEPS, self.energy, self.capacity)
-                best = np.argsort(-rows[:, 0], kind="stable")[:2].tolist()
-                mine.extend((float(rows[row, 0]), pitch, row) for row in best)
-                if rows[:, 2].min() > self.capacity.cells / 4:
-                    break  # smaller cells are only more
-            mine.sort(key=lambda entry: -entry[0])
-            moved = [
-                self._coarsely_moved(table, side, low, index, pitch, row)
-                for _, pitch, row in mine[:_MOVED]
-            ]
-            moved.sort(key=lambda item: -item.score)
-            ranked.extend(moved[:2])
+            mine = self._ranked(index, pitches)
+            for pitch in self._fitted(index, pitches):
+                mine.extend(self._ranked(index, np.array([pitch])))
+            mine.sort(key=lambda item: -item.score)
+            ranked.extend(mine[:2])
             if index % 16 == 15 or index == count - 1:
                 top = max(item.score for item in ranked)
                 progress.update(0.4 * (index + 1) / count, f"{index + 1} rotations, best {top:.1f}")
         ranked.sort(key=lambda item: -item.score)
         return ranked
+
+    def _ranked(self, rotation: int, pitches: NDArray[np.float64]) -> list[Ranked]:
+        """The best grids of one rotation, their planes moved, on one coarse scan."""
+        table, side, low = self._coarse(rotation, float(pitches.min()) / _COARSE)
+        found: list[tuple[float, float, int]] = []
+        for pitch in np.sort(pitches)[::-1].tolist():
+            rows = rank_translations(table, pitch / side, _STEPS, self.energy, self.capacity)
+            best = np.argsort(-rows[:, 0], kind="stable")[:2].tolist()
+            found.extend((float(rows[row, 0]), pitch, row) for row in best)
+            if rows[:, 2].min() > self.capacity.cells / 4:
+                break  # smaller cells are only more
+        found.sort(key=lambda entry: -entry[0])
+        return [
+            self._coarsely_moved(table, side, low, rotation, pitch, row)
+            for _, pitch, row in found[:_MOVED]
+        ]
+
+    def _fitted(self, rotation: int, pitches: NDArray[np.float64]) -> list[float]:
+        """Pitches about as large as `pitches` that divide a side of the model evenly.
+
+        Only for the model's own axes and its principal axes, where they can mean something: a part
+        that is made of equal blocks is then cut between them.
+        """
+        if rotation > 1 or len(pitches) < 2:
+            return []
+        extent = np.ptp(self.vertices @ self.rotations[rotation].T, axis=0)
+        cells = np.arange(1, self.capacity.cells + 1)
+        sides = (extent[:, None] / cells).ravel()
+        low, high = 0.85 * float(pitches.min()), 1.05 * float(pitches.max())
+        within = sides[(sides >= low) & (sides <= high)]
+        return [float(value) for value in np.unique(within)[:_MOST_FITTED]]
 
     def _coarsely_moved(
         self,
@@ -213,15 +237,25 @@ class Rounds:
         ]
         limit = int(self.limit / SUBDIVISION * step)
         moved = optimise_offsets(table, (regular[0], regular[1], regular[2]), limit, self.energy, 3)
-        verdict = self._verdict(table, moved.planes)
+        verdict = self._verdict(table, moved, side, pitch)
         # The first planes are half a cell before lattice 0.
         x, y, z = (low + start * side + 0.5 * pitch).tolist()
-        return Ranked(verdict.score - verdict.excess, rotation, pitch, (x, y, z))
+        score = verdict.score - _EXCESS_COST * verdict.excess
+        return Ranked(score, rotation, pitch, (x, y, z))
 
-    def _verdict(self, table: NDArray[np.int32], planes: Planes) -> Verdict:
-        widths = [np.diff(positions).astype(float) for positions in planes]
+    def _verdict(
+        self, table: NDArray[np.int32], moved: Offsets, side: float, pitch: float
+    ) -> Verdict:
+        """Judge a grid whose planes were moved.
+
+        Its score pays for the moves, and for material that the samples add or miss: flat faces
+        along the grid can be off by half a subvoxel each, all to the same side.
+        """
+        widths = [np.diff(positions).astype(float) for positions in moved.planes]
         size = widths[0][:, None, None] * widths[1][:, None] * widths[2]
-        return judge(box_counts(table, planes) / size, self.energy, self.capacity)
+        verdict = judge(box_counts(table, moved.planes) / size, self.energy, self.capacity)
+        missed = abs(float(table[-1, -1, -1]) * side**3 - self.volume) / pitch**3
+        return replace(verdict, score=verdict.score - missed - moved.effort(self.energy))
 
     def second(self, item: Ranked, pitches: tuple[int, ...], hold_origin: bool) -> list[Tried]:
         """Scan a placement at 20 x 20 x 20 and move the planes of several grids near it.
@@ -277,8 +311,8 @@ class Rounds:
             regular.append(shift[axis] + units * np.arange(-1, count + 2, dtype=np.int64))
         limit = self.limit * units // SUBDIVISION
         moved = optimise_offsets(table, (regular[0], regular[1], regular[2]), limit, self.energy)
-        verdict = self._verdict(table, moved.planes)
         pitch = units * side
+        verdict = self._verdict(table, moved, side, pitch)
         offsets = [moved.offsets[axis] / units for axis in range(3)]
         placement = Placement(
             rotation=self.rotations[rotation],

@@ -21,8 +21,12 @@ __all__ = ["MAX_LOSS", "voxelize"]
 MAX_LOSS = 0.10
 #: Placements of the second round that are refined in the third.
 _REFINED = 6
+#: Pitches to go on with, in twentieths of the ranked ones, where none of the second round fits.
+_LARGER = ((22, 23), (24, 25), (26, 28), (30, 33), (36, 40))
 #: Two voxelizations whose sorted fills differ by less than this on average are the same.
-_SAME_FILL = 0.02
+_SAME_FILL = 0.012
+#: A voxelization with at most this share of the template's cells is a roomy one.
+_ROOMY = 0.94
 
 
 def voxelize(
@@ -115,6 +119,12 @@ def voxelize(
         progress.update(0.4 + 0.3 * (index + 1) / len(ranked), f"{index + 1} grids, planes moved")
     found.sort(key=lambda tried: tried.order)
     if pitch is None and centre is None:
+        for step in _LARGER:
+            if found and found[0].verdict.excess == 0:
+                break
+            for item in ranked[:_REFINED]:
+                found.extend(rounds.second(item, step, False))
+            found.sort(key=lambda tried: tried.order)
         for tried in _different(found)[:_REFINED]:
             found.extend(rounds.third(tried))
         found.sort(key=lambda tried: tried.order)
@@ -211,35 +221,46 @@ def _different(found: list[Tried]) -> list[Tried]:
     return best
 
 
-def _is_new(voxels: Voxels, others: list[Voxels]) -> bool:
-    """Whether no other has (nearly) the same cells, turned or not."""
-    fills = np.sort(voxels.fill)
-    return all(
-        len(other) != len(voxels) or np.abs(np.sort(other.fill) - fills).mean() >= _SAME_FILL
-        for other in others
-    )
+def _shortlist(rounds: Rounds, found: list[Tried], count: int) -> list[Tried]:
+    """Up to `count` different ones that fit, best first but for every fourth.
+
+    Every fourth leaves a part of the template free, as long as there is such a one: a tree that is
+    hard to fold into a full template may be easy to fold into one with gaps.
+    """
+    roomy = int(_ROOMY * rounds.capacity.cells)
+    chosen: list[Tried] = []
+    used: dict[int, int] = {}
+
+    def is_new(tried: Tried) -> bool:
+        fills = tried.verdict.fills
+        return used.get(tried.rotation, 0) < 2 and all(
+            len(fills) != len(other.verdict.fills)
+            or np.abs(fills - other.verdict.fills).mean() >= _SAME_FILL
+            for other in chosen
+        )
+
+    fitting = [tried for tried in found if tried.verdict.excess == 0]
+    for place in range(count):
+        wanted = [tried for tried in fitting if is_new(tried)]
+        gaps = [tried for tried in wanted if tried.verdict.kept <= roomy]
+        pick = gaps if place % 4 == 3 and gaps else wanted
+        if not pick:
+            break
+        chosen.append(pick[0])
+        used[pick[0].rotation] = used.get(pick[0].rotation, 0) + 1
+    return chosen
 
 
 def _finish(
     rounds: Rounds, found: list[Tried], results: int, max_loss: float, progress: Progress
 ) -> list[Voxels]:
-    """Cut the best placements, check them, and keep different ones."""
+    """Cut the best placements and check them."""
     done: list[Voxels] = []
-    used: dict[int, int] = {}
-    seen: set[tuple[int, int, float]] = set()
     nearest = ""
-    attempts = 0
-    for tried in found:
-        if len(done) >= results or attempts >= 3 * results:
+    # Sampling the warped model can still cost a cell its place, so some more than are wanted.
+    for tried in _shortlist(rounds, found, 2 * results) or found[:results]:
+        if len(done) >= results:
             break
-        if used.get(tried.rotation, 0) >= 2:
-            continue
-        # Placements that differ by nothing that counts come out of the rounds many times over.
-        key = (tried.rotation, tried.verdict.kept, round(tried.verdict.fill, 1))
-        if key in seen:
-            continue
-        seen.add(key)
-        attempts += 1
         voxels, kept, excess = cut_voxels(
             rounds.vertices, rounds.faces, tried.placement, rounds.energy, rounds.capacity
         )
@@ -250,9 +271,8 @@ def _finish(
                 f"{kept} cells, with {100 * voxels.lost_volume:.0f} % of the volume lost "
                 f"(allowed: {100 * max_loss:.0f} %)"
             )
-        elif _is_new(voxels, done):
+        else:
             done.append(voxels)
-            used[tried.rotation] = used.get(tried.rotation, 0) + 1
             progress.update(0.8 + 0.2 * len(done) / results, f"{len(voxels)} voxels")
     if not done:
         even, odd = rounds.capacity.colours

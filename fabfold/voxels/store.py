@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,17 @@ from fabfold.voxels.model import SUBDIVISION, Voxels
 __all__ = ["load_voxels", "save_voxels"]
 
 _FORMAT = "fabfold-voxels 1"
+#: What numpy and zipfile raise over files that are cut off, damaged or something else.
+_UNREADABLE = (
+    AttributeError,
+    EOFError,
+    KeyError,
+    OSError,
+    TypeError,
+    ValueError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 def save_voxels(path: Path, voxels: Voxels) -> None:
@@ -84,7 +96,7 @@ def load_voxels(path: Path) -> Voxels:
                 lost_volume=float(data["lost_volume"]),
                 energy=dict(zip(names, data["energy_values"].tolist(), strict=True)),
             )
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+    except _UNREADABLE as error:
         raise KitError(
             f"{path}: cannot be read as voxels ({error}); delete it and make the voxels again"
         ) from error
