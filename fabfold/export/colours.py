@@ -63,13 +63,17 @@ def _ranked(count: int) -> tuple[tuple[int, int, int], ...]:
     if count > len(chosen):
         candidates = _candidates()
         lab = _oklab(candidates)
+        chroma = np.hypot(lab[:, 1], lab[:, 2])
+        strange = ((lab[:, 0] - 0.70) / 0.17) ** 2 + ((chroma - 0.12) / 0.05) ** 2
+        liking = 1.0 / (1.0 + 0.35 * strange)
         nearest = np.full(len(candidates), np.inf)
         for colour in chosen:
             distance = np.linalg.norm(lab - _oklab(colour[None])[0], axis=1)
             nearest = np.minimum(nearest, distance)
         while len(chosen) < count:
+            # Mild colours before dark, pale, dull and shrill ones, where they are as far apart.
             # Rounding makes ties fall to the first candidate on every machine.
-            best = int(np.round(nearest, 9).argmax())
+            best = int(np.round(nearest * liking, 9).argmax())
             chosen.append(candidates[best])
             nearest = np.minimum(nearest, np.linalg.norm(lab - lab[best], axis=1))
     return tuple((int(r), int(g), int(b)) for r, g, b in chosen)

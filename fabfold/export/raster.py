@@ -1,0 +1,245 @@
+"""Kernels of the software renderer: fill triangles, cast shadows, shade.
+
+All loops run in a fixed order in double precision, so a picture is the same on every run.
+"""
+
+# mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Ints = NDArray[np.int32]
+
+__all__ = ["cast_light", "fill_depth", "fill_triangles", "surface_points"]
+
+
+@njit(cache=True)
+def fill_triangles(
+    screen: Floats, corners: Ints, width: int, height: int
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Nearest triangle at each pixel.
+
+    Parameters
+    ----------
+    screen : (v, 3) float64 array
+        Pixel x and y of each vertex, and the inverse of its depth.
+    corners : (f, 3) int32 array
+    width, height : int
+
+    Returns
+    -------
+    nearness : (height, width) float32 array
+        Inverse depth; 0 where nothing is.
+    triangle : (height, width) int32 array
+        -1 where nothing is.
+    """
+    nearness = np.zeros((height, width), dtype=np.float32)
+    triangle = np.full((height, width), -1, dtype=np.int32)
+    for t in range(len(corners)):
+        a, b, c = corners[t]
+        ax, ay, bx, by = screen[a, 0], screen[a, 1], screen[b, 0], screen[b, 1]
+        cx, cy = screen[c, 0], screen[c, 1]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if area >= 0.0:  # y points down: front faces run clockwise on the screen
+            continue
+        left = max(0, math.ceil(min(ax, bx, cx) - 0.5))
+        right = min(width - 1, math.floor(max(ax, bx, cx) - 0.5))
+        top = max(0, math.ceil(min(ay, by, cy) - 0.5))
+        bottom = min(height - 1, math.floor(max(ay, by, cy) - 0.5))
+        for row in range(top, bottom + 1):
+            y = row + 0.5
+            for column in range(left, right + 1):
+                x = column + 0.5
+                u = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / area
+                v = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / area
+                w = 1.0 - u - v
+                if u < 0.0 or v < 0.0 or w < 0.0:
+                    continue
+                near = u * screen[a, 2] + v * screen[b, 2] + w * screen[c, 2]
+                if near > nearness[row, column]:
+                    nearness[row, column] = near
+                    triangle[row, column] = t
+    return nearness, triangle
+
+
+@njit(cache=True)
+def surface_points(
+    triangle: Ints, screen: Floats, corners: Ints, vertices: Floats, normals: Singles
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Place and normal of the surface at each covered pixel.
+
+    Parameters
+    ----------
+    triangle : (h, w) int32 array
+    screen : (v, 3) float64 array
+    corners : (f, 3) int32 array
+    vertices : (v, 3) float64 array
+    normals : (f, 3, 3) float32 array
+        At each corner of each triangle.
+
+    Returns
+    -------
+    points, directions : (h, w, 3) float32 arrays
+    """
+    height, width = triangle.shape
+    points = np.zeros((height, width, 3), dtype=np.float32)
+    directions = np.zeros((height, width, 3), dtype=np.float32)
+    for row in range(height):
+        for column in range(width):
+            t = triangle[row, column]
+            if t < 0:
+                continue
+            a, b, c = corners[t]
+            x, y = column + 0.5, row + 0.5
+            ax, ay, bx, by = screen[a, 0], screen[a, 1], screen[b, 0], screen[b, 1]
+            cx, cy = screen[c, 0], screen[c, 1]
+            area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+            u = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / area * screen[a, 2]
+            v = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / area * screen[b, 2]
+            w = ((ax - x) * (by - y) - (ay - y) * (bx - x)) / area * screen[c, 2]
+            total = u + v + w
+            u, v, w = u / total, v / total, w / total
+            length = 0.0
+            for k in range(3):
+                points[row, column, k] = (
+                    u * vertices[a, k] + v * vertices[b, k] + w * vertices[c, k]
+                )
+                value = u * normals[t, 0, k] + v * normals[t, 1, k] + w * normals[t, 2, k]
+                directions[row, column, k] = value
+                length += value * value
+            length = math.sqrt(length)
+            if length > 0.0:
+                for k in range(3):
+                    directions[row, column, k] /= length
+    return points, directions
+
+
+@njit(cache=True)
+def fill_depth(flat: Floats, corners: Ints, size: int) -> NDArray[np.float32]:
+    """Greatest height above each texel of a square map.
+
+    Parameters
+    ----------
+    flat : (v, 3) float64 array
+        Texel x and y of each vertex, and its height towards the light.
+    corners : (f, 3) int32 array
+    size : int
+
+    Returns
+    -------
+    (size, size) float32 array
+        Very low where nothing is.
+    """
+    depth = np.full((size, size), -1e30, dtype=np.float32)
+    for t in range(len(corners)):
+        a, b, c = corners[t]
+        ax, ay, bx, by = flat[a, 0], flat[a, 1], flat[b, 0], flat[b, 1]
+        cx, cy = flat[c, 0], flat[c, 1]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if area <= 0.0:  # only what faces the light; the other side is in its own shade
+            continue
+        left = max(0, math.ceil(min(ax, bx, cx) - 0.5))
+        right = min(size - 1, math.floor(max(ax, bx, cx) - 0.5))
+        top = max(0, math.ceil(min(ay, by, cy) - 0.5))
+        bottom = min(size - 1, math.floor(max(ay, by, cy) - 0.5))
+        if left > right or top > bottom:
+            continue
+        # Height is linear over the triangle: one division a triangle, additions a texel.
+        ux = (by - cy) / area
+        vx = (cy - ay) / area
+        uy = (cx - bx) / area
+        vy = (ax - cx) / area
+        for row in range(top, bottom + 1):
+            y = row + 0.5
+            u = ux * (left + 0.5 - cx) + uy * (y - cy)
+            v = vx * (left + 0.5 - cx) + vy * (y - cy)
+            for column in range(left, right + 1):
+                w = 1.0 - u - v
+                if u >= 0.0 and v >= 0.0 and w >= 0.0:
+                    high = u * flat[a, 2] + v * flat[b, 2] + w * flat[c, 2]
+                    depth[row, column] = max(depth[row, column], high)
+                u += ux
+                v += vx
+    return depth
+
+
+@njit(cache=True)
+def cast_light(
+    light: Singles,
+    points: Singles,
+    directions: Singles,
+    depth: Singles,
+    frame: Floats,
+    offset: Floats,
+    scale: float,
+    bias: float,
+    strength: float,
+    scatter: float,
+) -> None:
+    """Add one distant light, with its shadows, to the light that falls on each point.
+
+    Parameters
+    ----------
+    light : (n,) float32 array
+        Added to in place.
+    points, directions : (n, 3) float32 arrays
+        Place and normal.
+    depth : (s, s) float32 array
+        From :func:`fill_depth`.
+    frame : (3, 3) float64 array
+        Rows: the map's x, its y, and the direction towards the light.
+    offset : (2,) float64 array
+        Of the map's corner along its x and y.
+    scale : float
+        Texels a unit of length.
+    bias : float
+        How far points are lifted off their surface before the comparison.
+    strength : float
+    scatter : float
+        Texels by which lookups are scattered.
+    """
+    size = depth.shape[0]
+    state = np.int64(12345)
+    for i in range(len(points)):
+        slope = (
+            directions[i, 0] * frame[2, 0]
+            + directions[i, 1] * frame[2, 1]
+            + directions[i, 2] * frame[2, 2]
+        )
+        if slope <= 0.0:
+            continue
+        lift = bias * (1.0 + 2.0 * (1.0 - slope))
+        px = points[i, 0] + lift * directions[i, 0]
+        py = points[i, 1] + lift * directions[i, 1]
+        pz = points[i, 2] + lift * directions[i, 2]
+        # Lookups scatter by up to a texel, so that many sharp shadows blend into a soft one.
+        state = (state * 1664525 + 1013904223) & 0xFFFFFFFF
+        jitter_x = (state >> 16) / 32768.0 - 1.0
+        state = (state * 1664525 + 1013904223) & 0xFFFFFFFF
+        jitter_y = (state >> 16) / 32768.0 - 1.0
+        x = (px * frame[0, 0] + py * frame[0, 1] + pz * frame[0, 2] - offset[0]) * scale - 0.5
+        y = (px * frame[1, 0] + py * frame[1, 1] + pz * frame[1, 2] - offset[1]) * scale - 0.5
+        x += scatter * jitter_x
+        y += scatter * jitter_y
+        high = px * frame[2, 0] + py * frame[2, 1] + pz * frame[2, 2]
+        column, row = math.floor(x), math.floor(y)
+        if column < 0 or row < 0 or column >= size - 1 or row >= size - 1:
+            light[i] += strength * slope
+            continue
+        fx, fy = x - column, y - row
+        seen = 0.0
+        if depth[row, column] <= high:
+            seen += (1.0 - fx) * (1.0 - fy)
+        if depth[row, column + 1] <= high:
+            seen += fx * (1.0 - fy)
+        if depth[row + 1, column] <= high:
+            seen += (1.0 - fx) * fy
+        if depth[row + 1, column + 1] <= high:
+            seen += fx * fy
+        light[i] += strength * slope * seen
