@@ -175,3 +175,16 @@ def corner_solid():
         for shift in ((0.5, 0.0, 0.0), (1.0, 0.0, 0.5))
     ]
     return manifold3d.Manifold.batch_boolean([*cubes, *bridges], manifold3d.OpType.Add)
+
+
+def posed(joinery, tree: FoldTree, angles_deg: NDArray[np.float64]):
+    """Bodies of a kit as manifolds in a state of the folding path, mm, root body at rest."""
+    from fabfold.joinery.cells import as_manifold
+
+    origin = np.array(joinery.origin_mm)
+    placed = []
+    for body, pose in zip(joinery.bodies, tree.body_poses(angles_deg), strict=True):
+        move = pose[:3].copy()
+        move[:, 3] = joinery.voxel_mm * pose[:3, 3] + origin - pose[:3, :3] @ origin
+        placed.append(as_manifold(body.vertices, body.faces, body.name).transform(move))
+    return placed

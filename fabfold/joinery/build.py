@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
+from fabfold.fold.barrels import first_encounter
 from fabfold.fold.model import Motion
 from fabfold.joinery.cells import eroded_cells, model_manifold
 from fabfold.joinery.grooves import Passage, groove_tools, passages
@@ -16,7 +16,7 @@ from fabfold.joinery.model import BodyMesh, Joinery
 from fabfold.joinery.placement import HingePieces, hinge_pieces, knuckle_zone
 from fabfold.joinery.sizes import HingeSize, hinge_size, strut_width
 from fabfold.joinery.soundness import finish_mesh
-from fabfold.joinery.struts import bar_solid, grid_of, plan_struts
+from fabfold.joinery.unite import CRUMB_SHARE, Tally, one_piece
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.model import FoldTree
 from fabfold.voxels.model import Voxels
@@ -24,25 +24,10 @@ from fabfold.voxels.model import Voxels
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["CRUMB_SHARE", "build_bodies"]
+__all__ = ["build_bodies"]
 
-#: Loose pieces below this share of a full cell's volume are left out.
-CRUMB_SHARE = 0.005
 #: A groove may not take more than this from the knuckles of a hinge, in mm³.
 _ZONE_LOSS_MM3 = 0.01
-_STRUT_ROUNDS = 3
-
-
-@dataclass
-class _Tally:
-    """What the stages of one kit took away and added."""
-
-    carved_cells: int = 0
-    carved_mm3: float = 0.0
-    dropped_mm3: float = 0.0
-    crumbs: int = 0
-    struts: int = 0
-    strutted: list[str] = field(default_factory=list)
 
 
 def build_bodies(
@@ -98,12 +83,13 @@ def build_bodies(
     _check_inputs(voxels, tree, motion, voxel_mm, clearance_mm)
     size = hinge_size(voxel_mm, clearance_mm, barrel_radius_mm, pin_radius_mm, knuckles)
     told.update(0.0, "preparing the model and the hinges")
+    _refuse_encounters(tree, motion, size, voxel_mm)
     model = model_manifold(voxels, voxel_mm)
     hinges = hinge_pieces(tree, size, voxel_mm)
     ways: list[list[Passage]] = [[] for _ in tree.bodies]
-    for passage in passages(tree, motion, np.ones(len(tree.hinges), dtype=bool)):
+    for passage in passages(tree, motion, 1.05 * size.reach_mm / voxel_mm):
         ways[passage.body].append(passage)
-    tally = _Tally()
+    tally = Tally()
     origin = voxel_mm * (0.5 - tree.source.min(axis=0).astype(float))
     meshes = []
     for index, body in enumerate(tree.bodies):
@@ -129,12 +115,17 @@ def build_bodies(
     )
 
 
-def _notes(tally: _Tally, voxel_mm: float) -> tuple[str, ...]:
+def _notes(tally: Tally, voxel_mm: float) -> tuple[str, ...]:
     notes = []
     if tally.carved_cells:
         notes.append(
             f"{tally.carved_mm3:.0f} mm³ taken out of {tally.carved_cells} cells "
             "so that hinge barrels can pass"
+        )
+    if tally.hollows:
+        notes.append(
+            f"{tally.hollows} closed hollows filled, {tally.filled_mm3:.0f} mm³ in all: "
+            "nothing could be cleaned out of them"
         )
     if tally.crumbs:
         notes.append(
@@ -177,6 +168,23 @@ def _check_inputs(
             )
 
 
+def _refuse_encounters(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm: float) -> None:
+    """Refuse a path on which two barrels run into each other, before anything is cut."""
+    found = first_encounter(
+        tree,
+        motion,
+        inset=(size.reach_mm + size.barrel_radius_mm) / voxel_mm,
+        least=(size.reach_mm + size.barrel_radius_mm) / voxel_mm,
+    )
+    if found is not None:
+        one, other = tree.hinges[found.moving], tree.hinges[found.resting]
+        raise GeometryError(
+            f"the barrel of {one.name} runs into the barrel of {other.name} while "
+            f"{tree.hinges[found.turning].name} turns, after {found.angle_deg:.0f}° of move "
+            f"{found.move}"
+        )
+
+
 def _body(
     index: int,
     tree: FoldTree,
@@ -185,7 +193,7 @@ def _body(
     ways: list[Passage],
     size: HingeSize,
     voxel_mm: float,
-    tally: _Tally,
+    tally: Tally,
 ) -> manifold3d.Manifold:
     """One body as one connected solid, lattice origin at zero."""
     import manifold3d
@@ -195,36 +203,38 @@ def _body(
     room = eroded_cells(cells, voxel_mm, size.clearance_mm / 2)
     own = [
         (h, pieces.parent_half, pieces.parent_carve)
-        for h, pieces in enumerate(hinges)
         if tree.hinges[h].parent == index
-    ]
-    own += [
-        (h, pieces.child_half, pieces.child_carve)
+        else (h, pieces.child_half, pieces.child_carve)
         for h, pieces in enumerate(hinges)
-        if tree.hinges[h].child == index
+        if index in (tree.hinges[h].parent, tree.hinges[h].child)
     ]
-    material = model ^ room
+    carves = [carve for _, _, carve in own]
+    material = _less(model ^ room, carves)
+    halves = [_less(half, [carve for other, _, carve in own if other != h]) for h, half, _ in own]
     tools = groove_tools(
         ways,
-        *_material_boxes(material, cells, own, voxel_mm),
+        *_boxes(cells, halves, voxel_mm),
         voxel_mm=voxel_mm,
         radius_mm=size.reach_mm,
         trim_mm=size.barrel_radius_mm,
     )
-    carves = [carve for _, _, carve in own]
-    free, material = _less(room, carves), _less(material, carves)
-    halves = [_less(half, [carve for other, _, carve in own if other != h]) for h, half, _ in own]
-    if tools:
-        groove = manifold3d.Manifold.batch_boolean(tools, manifold3d.OpType.Add)
-        _protect_zones(index, tree, groove, [h for h, _, _ in own], ways, size, voxel_mm)
-        lost = material ^ groove
+    whole = manifold3d.Manifold.batch_boolean([material, *halves], manifold3d.OpType.Add)
+    cutting = [(h, tool) for h, tool in tools if (whole ^ tool).volume() > 1e-6]
+    _protect_zones(index, tree, cutting, [h for h, _, _ in own], size, voxel_mm)
+    if cutting:
+        cuts = [tool for _, tool in cutting]
+        lost = material ^ manifold3d.Manifold.batch_boolean(cuts, manifold3d.OpType.Add)
         volume = lost.volume()
         if volume > 0.01:
             tally.carved_mm3 += volume
             tally.carved_cells += _cells_of(lost, cells, voxel_mm)
-        free, material = free - groove, material - groove
-        halves = [half - groove for half in halves]
-    return _one_piece(body.name, cells, free, material, halves, voxel_mm, tally)
+        material = _less(material, cuts)
+        halves = [_less(half, cuts) for half in halves]
+
+    def free() -> manifold3d.Manifold:
+        return _less(room, [*carves, *(tool for _, tool in tools)])
+
+    return one_piece(body.name, cells, free, material, halves, voxel_mm, tally)
 
 
 def _less(solid: manifold3d.Manifold, tools: list[manifold3d.Manifold]) -> manifold3d.Manifold:
@@ -235,29 +245,19 @@ def _less(solid: manifold3d.Manifold, tools: list[manifold3d.Manifold]) -> manif
     return manifold3d.Manifold.batch_boolean([solid, *tools], manifold3d.OpType.Subtract)
 
 
-def _material_boxes(
-    material: manifold3d.Manifold,
+def _boxes(
     cells: NDArray[np.int32],
-    own: list[tuple[int, manifold3d.Manifold, manifold3d.Manifold]],
+    halves: list[manifold3d.Manifold],
     voxel_mm: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Boxes in lattice units that hold all that a groove could meet: material, then knuckles."""
-    low, high = [], []
-    for cell in cells:
-        corner = (cell - 0.5) * voxel_mm
-        low.append(corner)
-        high.append(corner + voxel_mm)
-    if not material.is_empty():
-        box = np.array(material.bounding_box())
-        low = [np.maximum(corner, box[:3]) for corner in low]
-        high = [np.minimum(corner, box[3:]) for corner in high]
-    for _, half, _ in own:
+    """Boxes in lattice units that hold all that a groove could meet, struts included."""
+    lows = list((cells - 0.5) * voxel_mm)
+    highs = list((cells + 0.5) * voxel_mm)
+    for half in halves:
         box = np.array(half.bounding_box())
-        low.append(box[:3])
-        high.append(box[3:])
-    lows, highs = np.array(low), np.array(high)
-    held = (lows < highs).all(axis=1)
-    return lows[held] / voxel_mm, highs[held] / voxel_mm
+        lows.append(box[:3])
+        highs.append(box[3:])
+    return np.array(lows) / voxel_mm, np.array(highs) / voxel_mm
 
 
 def _cells_of(solid: manifold3d.Manifold, cells: NDArray[np.int32], voxel_mm: float) -> int:
@@ -274,118 +274,17 @@ def _cells_of(solid: manifold3d.Manifold, cells: NDArray[np.int32], voxel_mm: fl
 def _protect_zones(
     index: int,
     tree: FoldTree,
-    groove: manifold3d.Manifold,
+    cutting: list[tuple[int, manifold3d.Manifold]],
     own: list[int],
-    ways: list[Passage],
     size: HingeSize,
     voxel_mm: float,
 ) -> None:
     """Refuse a groove that would cut into the knuckles of one of the body's own hinges."""
     for h in own:
         zone = knuckle_zone(tree.hinges[h], size, voxel_mm)
-        if (zone ^ groove).volume() <= _ZONE_LOSS_MM3:
-            continue
-        culprit = _culprit(zone, ways, size, voxel_mm)
-        whose = "another hinge" if culprit is None else tree.hinges[culprit].name
-        raise GeometryError(
-            f"{tree.bodies[index].name}: the barrel of {whose} passes through the knuckles of "
-            f"{tree.hinges[h].name} on the folding path"
-        )
-
-
-def _culprit(
-    zone: manifold3d.Manifold, ways: list[Passage], size: HingeSize, voxel_mm: float
-) -> int | None:
-    import manifold3d
-
-    box = np.array(zone.bounding_box()) / voxel_mm
-    for passage in ways:
-        tools = groove_tools(
-            [passage],
-            box[None, :3],
-            box[None, 3:],
-            voxel_mm=voxel_mm,
-            radius_mm=size.reach_mm,
-            trim_mm=size.barrel_radius_mm,
-        )
-        if not tools:
-            continue
-        groove = manifold3d.Manifold.batch_boolean(tools, manifold3d.OpType.Add)
-        if (zone ^ groove).volume() > _ZONE_LOSS_MM3:
-            return passage.hinge
-    return None
-
-
-def _one_piece(
-    name: str,
-    cells: NDArray[np.int32],
-    free: manifold3d.Manifold,
-    material: manifold3d.Manifold,
-    halves: list[manifold3d.Manifold],
-    voxel_mm: float,
-    tally: _Tally,
-) -> manifold3d.Manifold:
-    """Material and hinge halves as one piece, with struts where it takes them."""
-    import manifold3d
-
-    add = manifold3d.OpType.Add
-    solid = manifold3d.Manifold.batch_boolean([material, *halves], add)
-    grid = grid_of(cells, voxel_mm)
-    crumb = CRUMB_SHARE * voxel_mm**3
-    open_room = grid.sample(free)
-    brackets = [grid.sample(half) for half in halves]
-    for _ in range(_STRUT_ROUNDS):
-        pieces, crumbs = _sorted_pieces(solid, halves, crumb)
-        if not pieces:
-            raise GeometryError(
-                f"{name}: its {len(cells)} cells hold no piece of material above {crumb:.0f} mm³ "
-                "and no hinge"
-            )
-        if crumbs:
-            tally.crumbs += len(crumbs)
-            tally.dropped_mm3 += sum(piece.volume() for piece in crumbs)
-            solid = manifold3d.Manifold.batch_boolean(pieces, add)
-        filled = grid.sample(solid)
-        samples = [grid.sample(piece) for piece in pieces] if len(pieces) > 1 else []
-        bars = plan_struts(grid, open_room, filled, samples, brackets)
-        if bars is None:
-            raise GeometryError(
-                f"{name}: {len(pieces)} pieces of material lie apart in its cells, and grooves and "
-                "hinges leave no way for a strut between them"
-            )
-        if not bars:
-            if len(pieces) == 1:
-                return pieces[0]
-            break
-        tally.struts += len(bars)
-        if name not in tally.strutted:
-            tally.strutted.append(name)
-        width = strut_width(voxel_mm)
-        solids = [bar_solid(bar, width) ^ free for bar in bars]
-        solid = manifold3d.Manifold.batch_boolean([solid, *solids], add)
-    pieces, crumbs = _sorted_pieces(solid, halves, crumb)
-    if len(pieces) != 1:
-        raise GeometryError(
-            f"{name}: still {len(pieces)} pieces after struts were added; "
-            "another tree or a larger voxel may do"
-        )
-    tally.crumbs += len(crumbs)
-    tally.dropped_mm3 += sum(piece.volume() for piece in crumbs)
-    return pieces[0]
-
-
-def _sorted_pieces(
-    solid: manifold3d.Manifold, halves: list[manifold3d.Manifold], crumb: float
-) -> tuple[list[manifold3d.Manifold], list[manifold3d.Manifold]]:
-    """Pieces worth keeping, the largest first, and crumbs; a piece with a hinge is kept."""
-    pieces = sorted(solid.decompose(), key=lambda piece: -piece.volume())
-    if len(pieces) == 1:
-        return pieces, []
-    kept, crumbs = [], []
-    for piece in pieces:
-        small = piece.volume() < crumb
-        if small and not any((piece ^ half).volume() > 1e-3 for half in halves):
-            crumbs.append(piece)
-        else:
-            kept.append(piece)
-    return kept, crumbs
+        for culprit, tool in cutting:
+            if (zone ^ tool).volume() > _ZONE_LOSS_MM3:
+                raise GeometryError(
+                    f"{tree.bodies[index].name}: the barrel of {tree.hinges[culprit].name} passes "
+                    f"through the knuckles of {tree.hinges[h].name} on the folding path"
+                )

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.fold.model import Motion
-from fabfold.lattice import rotation_about
 from fabfold.tree.model import FoldTree
 
 if TYPE_CHECKING:
@@ -62,14 +61,11 @@ class Passage:
 
     def placements(self, angles_deg: Floats) -> Floats:
         """Ends of the barrel's edge at some angles of the turn, shape (a, 2, 3)."""
-        return np.array(
-            [
-                self.start
-                @ (turn := rotation_about(self.point, self.direction, float(a)))[:3, :3].T
-                + turn[:3, 3]
-                for a in angles_deg
-            ]
-        )
+        radians = np.radians(np.asarray(angles_deg, dtype=float))[:, None, None]
+        away = self.start - self.point
+        along = (away @ self.direction)[:, None] * self.direction
+        turned = np.cos(radians) * (away - along) + np.sin(radians) * np.cross(self.direction, away)
+        return np.asarray(self.point + along + turned)
 
 
 def descendants(tree: FoldTree) -> NDArray[np.bool_]:
@@ -84,16 +80,17 @@ def descendants(tree: FoldTree) -> NDArray[np.bool_]:
     return moves
 
 
-def passages(tree: FoldTree, motion: Motion, barrels: NDArray[np.bool_]) -> list[Passage]:
-    """Every distinct way in which a barrel comes past a body that it does not belong to.
+def passages(tree: FoldTree, motion: Motion, reach: float) -> list[Passage]:
+    """Every distinct way in which a barrel may come past a body that it does not belong to.
 
     Parameters
     ----------
     tree : FoldTree
     motion : Motion
         One hinge a move, linear between keyframes.
-    barrels : (h,) bool array
-        Hinges that have a barrel.
+    reach : float
+        Radius of a groove in lattice units; passages that stay farther than this from every cell
+        of the body are left out.
 
     Returns
     -------
@@ -107,49 +104,85 @@ def passages(tree: FoldTree, motion: Motion, barrels: NDArray[np.bool_]) -> list
             for h in tree.hinges
         ]
     ).reshape(-1, 2, 3)
+    parents = np.array([h.parent for h in tree.hinges], dtype=int)
+    owner = tree.voxel_body
     found: dict[tuple[object, ...], Passage] = {}
 
     def keep(passage: Passage) -> None:
-        key = _key(passage)
-        if key not in found:
-            found[key] = passage
+        found.setdefault(_key(passage), passage)
 
     zero = np.zeros(3)
     for h, hinge in enumerate(tree.hinges):
-        if not barrels[h]:
-            continue
-        for b in range(len(tree.bodies)):
+        near = _box_distance(ends[h], tree.source) < reach
+        for b in np.unique(owner[near]).tolist():
             if b not in (hinge.parent, hinge.child):
                 keep(Passage(b, h, ends[h], zero, zero, 0.0))
     for k in range(1, len(motion.angles_deg)):
         poses = tree.body_poses(motion.angles_deg[k - 1])
-        inverses = np.array([_inverse(pose) for pose in poses])
+        placed = _moved(poses[parents], ends)
+        cells = _moved(poses[owner], tree.source[:, None].astype(float))[:, 0]
         for m in motion.moves[k]:
             turn = float(motion.angles_deg[k, m] - motion.angles_deg[k - 1, m])
-            world = poses[tree.hinges[m].parent]
-            axis_point = world[:3, :3] @ np.array(tree.hinges[m].point) + world[:3, 3]
+            world = poses[parents[m]]
+            point = world[:3, :3] @ np.array(tree.hinges[m].point) + world[:3, 3]
             axis = world[:3, :3] @ np.array(tree.hinges[m].direction, dtype=float)
-            for h, hinge in enumerate(tree.hinges):
-                if h == m or not barrels[h]:
-                    continue
-                pose = poses[hinge.parent]
-                placed = ends[h] @ pose[:3, :3].T + pose[:3, 3]
-                moving = carried[m, hinge.parent]
-                for b in range(len(tree.bodies)):
-                    if carried[m, b] == moving:
-                        continue
-                    back = inverses[b]
+            moving = carried[m, parents]
+            meets = _may_meet(placed, cells, point, axis, reach)
+            meets &= moving[:, None] != carried[m, owner][None, :]
+            meets[m] = False
+            for h in np.flatnonzero(meets.any(axis=1)).tolist():
+                for b in np.unique(owner[meets[h]]).tolist():
+                    back = _inverse(poses[b])
                     keep(
                         Passage(
                             b,
                             h,
-                            placed @ back[:3, :3].T + back[:3, 3],
-                            back[:3, :3] @ axis_point + back[:3, 3],
+                            placed[h] @ back[:3, :3].T + back[:3, 3],
+                            back[:3, :3] @ point + back[:3, 3],
                             back[:3, :3] @ axis,
-                            turn if moving else -turn,
+                            turn if moving[h] else -turn,
                         )
                     )
     return _without_covered_rests(list(found.values()))
+
+
+def _moved(poses: Floats, points: Floats) -> Floats:
+    """Sets of points (n, k, 3) moved by poses (n, 4, 4)."""
+    return np.asarray(np.einsum("nij,nkj->nki", poses[:, :3, :3], points) + poses[:, None, :3, 3])
+
+
+def _box_distance(segment: Floats, cells: NDArray[np.int32]) -> Floats:
+    """Lower bound of the distance from a segment along an axis to unit cubes, shape (n,)."""
+    low, high = segment.min(axis=0), segment.max(axis=0)
+    gap = np.maximum(np.maximum(cells - 0.5 - high, low - cells - 0.5), 0.0)
+    return np.asarray(np.linalg.norm(gap, axis=1), dtype=float)
+
+
+def _may_meet(
+    segments: Floats, cells: Floats, point: Floats, axis: Floats, reach: float
+) -> NDArray[np.bool_]:
+    """Whether barrels (h, 2, 3) can come near unit cubes (n, 3) in a turn about an axis, (h, n).
+
+    Both keep their place along the axis and their distance from it.
+    """
+    ends = segments - point
+    along = ends @ axis
+    across = ends - along[..., None] * axis
+    way = across[:, 1] - across[:, 0]
+    length2 = np.maximum((way**2).sum(axis=1), 1e-12)
+    foot = np.clip(-(across[:, 0] * way).sum(axis=1) / length2, 0.0, 1.0)
+    nearest = np.linalg.norm(across[:, 0] + foot[:, None] * way, axis=1)
+    farthest = np.linalg.norm(across, axis=2).max(axis=1)
+    centre = cells - point
+    height = centre @ axis
+    radius = np.linalg.norm(centre - height[:, None] * axis, axis=1)
+    corner = np.sqrt(0.5)
+    return np.asarray(
+        (along.min(axis=1)[:, None] - reach < height + 0.5)
+        & (along.max(axis=1)[:, None] + reach > height - 0.5)
+        & (nearest[:, None] - reach < radius + corner)
+        & (farthest[:, None] + reach > radius - corner)
+    )
 
 
 def _inverse(pose: Floats) -> Floats:
@@ -238,7 +271,7 @@ def groove_tools(
     voxel_mm: float,
     radius_mm: float,
     trim_mm: float,
-) -> list[manifold3d.Manifold]:
+) -> list[tuple[int, manifold3d.Manifold]]:
     """Cutting solids for one body.
 
     Parameters
@@ -255,8 +288,8 @@ def groove_tools(
 
     Returns
     -------
-    list of manifold3d.Manifold
-        Convex solids in mm that may overlap each other.
+    list of (int, manifold3d.Manifold)
+        Hinge and convex solid in mm; solids may overlap each other.
     """
     import manifold3d
 
@@ -266,7 +299,7 @@ def groove_tools(
         if passage.angle_deg == 0.0:
             if _segment_distance(passage.start[None], low, high)[0] < reach:
                 rod = _rod(passage.start * voxel_mm, radius_mm, trim_mm)
-                tools.append(manifold3d.Manifold.hull_points(rod))
+                tools.append((passage.hinge, manifold3d.Manifold.hull_points(rod)))
             continue
         arm = _arm(passage)
         step = min(
@@ -285,7 +318,7 @@ def groove_tools(
                 _rod(ends * voxel_mm, radius_mm + SAGITTA_MM, trim_mm - SAGITTA_MM)
                 for ends in placements[index : index + 2]
             ]
-            tools.append(manifold3d.Manifold.hull_points(np.concatenate(rods)))
+            tools.append((passage.hinge, manifold3d.Manifold.hull_points(np.concatenate(rods))))
     return tools
 
 

@@ -14,6 +14,7 @@ neck of a tenth of a voxel or more.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -89,19 +90,17 @@ def grid_of(cells: NDArray[np.int32], voxel_mm: float) -> Grid:
 
 
 def plan_struts(
-    grid: Grid, free: Bools, solid: Bools, pieces: list[Bools], brackets: list[Bools]
+    grid: Grid, free: Callable[[], Bools], pieces: list[Bools], brackets: list[Bools]
 ) -> list[Bar] | None:
     """Bars that tie all pieces, brackets and cells of a body together.
 
     Parameters
     ----------
     grid : Grid
-    free : (x, y, z) bool array
-        Where a bar may run.
-    solid : (x, y, z) bool array
-        Material.
+    free : callable
+        Gives the (x, y, z) bool array of where a bar may run; called only when one is needed.
     pieces : list of (x, y, z) bool arrays
-        The separate pieces of the material; may be empty if there is only one.
+        The separate pieces of the material.
     brackets : list of (x, y, z) bool arrays
         The material of each hinge half inside the free space.
 
@@ -112,7 +111,7 @@ def plan_struts(
     """
     from scipy import ndimage
 
-    label = _core_parts(pieces or [solid])
+    label = _core_parts(pieces)
     terminals = _terminals(grid, label, pieces, brackets)
     if len(terminals) < 2:
         return []
@@ -120,7 +119,8 @@ def plan_struts(
     groups = _merge_by_core(terminals, label)
     if len(groups) < 2:
         return []
-    way = _Ways(free, solid)
+    solid = np.logical_or.reduce(pieces)
+    way = _Ways(free(), solid)
     inner = ndimage.binary_erosion(solid, np.ones((3, 3, 3), dtype=bool)).reshape(-1)
     bars: list[Bar] = []
     while len(groups) > 1:
@@ -164,8 +164,9 @@ def _terminals(
             found.append(nodes)
     for piece in pieces:
         nodes = np.flatnonzero(piece)
+        cored = label.reshape(-1)[nodes] > 0
         if len(nodes):
-            found.append(nodes)
+            found.append(nodes[cored] if cored.any() else nodes)
     flat_label, flat_cell = label.reshape(-1), grid.cell.reshape(-1)
     for cell in range(int(grid.cell.max()) + 1):
         inside = np.flatnonzero((flat_cell == cell) & (flat_label > 0))
@@ -181,9 +182,11 @@ def _terminals(
 def _merge_by_core(
     terminals: list[NDArray[np.int64]], label: NDArray[np.int32]
 ) -> list[NDArray[np.int64]]:
-    """Unite terminals that share points or reach into the same core part.
+    """Unite terminals that lie in the same core part.
 
-    A piece without any core (a thin blade) hangs together with what it shares points with.
+    A terminal counts for the core part that holds most of it: a piece of two lumps with a thread
+    between them must not make the lumps one. A terminal without any core (a thin blade) hangs
+    together with what it shares points with.
     """
     import networkx as nx
 
@@ -193,9 +196,9 @@ def _merge_by_core(
     owner: dict[tuple[str, int], int] = {}
     for index, nodes in enumerate(terminals):
         parts = flat[nodes]
-        labels = np.unique(parts[parts > 0]).tolist()
-        keys = [("core", int(part)) for part in labels]
-        if not keys:
+        if (parts > 0).any():
+            keys = [("core", int(np.bincount(parts[parts > 0]).argmax()))]
+        else:
             keys = [("point", int(node)) for node in nodes]
         for key in keys:
             if key in owner:
