@@ -29,8 +29,11 @@ def build_shape(shape: Shape) -> bd.Solid:
         frame = bd.Plane(origin=shape.origin, x_dir=shape.x_dir, z_dir=shape.z_dir)
         return build_shape(shape.shape).moved(frame.location)
     if isinstance(shape, Prism):
-        rim = bd.Wire.make_polygon([(x, y, shape.start) for x, y in shape.outline], close=True)
-        return bd.Solid.extrude(bd.Face(rim), bd.Vector(0, 0, shape.end - shape.start))
+        rim, *inner = (
+            bd.Wire.make_polygon([(x, y, shape.start) for x, y in outline], close=True)
+            for outline in (shape.outline, *shape.holes)
+        )
+        return bd.Solid.extrude(bd.Face(rim, inner), bd.Vector(0, 0, shape.end - shape.start))
     rim = bd.Wire.make_polygon([(r, 0, z) for r, z in shape.outline], close=True)
     turned = bd.Solid.revolve(bd.Face(rim), shape.turn, bd.Axis.Z)
     return turned.rotate(bd.Axis.Z, shape.begin) if shape.begin else turned

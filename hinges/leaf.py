@@ -82,6 +82,9 @@ class Leaf:
         Their diameter in mm.
     sink : float
         Diameter of a 90° countersink on the upper face in mm; 0 for none.
+    flat : bool
+        Cut the barrels flat below, where they would overhang by more than 45°, and lay the plate's
+        lower face in that plane: a hinge to print lying, without support.
     """
 
     width: float
@@ -90,10 +93,12 @@ class Leaf:
     holes: int = 0
     hole: float = 3.4
     sink: float = 0.0
+    flat: bool = False
 
     def limits(self, train: Train, gap: float) -> tuple[float, float, float, float]:
         """Near and far limit across the face, near and far limit along it, in mm."""
-        top = max(0.5 * gap, train.radius - self.thickness) if self.offset is None else self.offset
+        level = train.radius * (0.5**0.5 if self.flat else 1.0)
+        top = max(0.5 * gap, level - self.thickness) if self.offset is None else self.offset
         return 0.5 * gap, self.width, top, top + self.thickness
 
     def check(self, train: Train, gap: float, wall: float) -> None:
@@ -165,8 +170,13 @@ class Leaf:
         return (box(west, east, -bottom, -top, train.start, train.end),)
 
     def drilled(self, train: Train, gap: float, side: float) -> tuple[Shape, ...]:
-        """Give the screw holes, drilled from the upper face."""
+        """Give the screw holes, drilled from the upper face, and what lies below a flat foot."""
         _, far, top, bottom = self.limits(train, gap)
+        foot: tuple[Shape, ...] = ()
+        if self.flat:
+            level, wide = max(bottom, train.radius * 0.5**0.5), 1.1 * train.radius
+            deep = max(level, train.radius) + 1.0
+            foot = (box(-wide, wide, -deep, -level, train.start - 1.0, train.end + 1.0),)
         middle = 0.5 * side * (train.reach + far)
         radius, over = 0.5 * self.hole, 0.01
         deep = bottom - top + over
@@ -175,7 +185,7 @@ class Leaf:
             wide = 0.5 * self.sink
             outline[1:2] = [(wide + over, -over), (radius, wide - radius)]
         pitch = (train.end - train.start) / max(self.holes, 1)
-        return tuple(
+        drilled = tuple(
             Moved(
                 Turned(tuple(outline)),
                 (middle, -top, train.start + (index + 0.5) * pitch),
@@ -184,3 +194,4 @@ class Leaf:
             )
             for index in range(self.holes)
         )
+        return (*foot, *drilled)

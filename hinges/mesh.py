@@ -162,7 +162,8 @@ def solid_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
         frame = np.column_stack((shape.x_dir, shape.y_dir, shape.z_dir, shape.origin))
         return solid_of(shape.shape, segments, outside=outside).transform(frame)
     if isinstance(shape, Prism):
-        section = CrossSection([list(shape.outline)], FillRule.Positive)
+        rims = [list(shape.outline), *(list(hole) for hole in shape.holes)]
+        section = CrossSection(rims, FillRule.EvenOdd)
         return Manifold.extrude(section, shape.end - shape.start).translate((0, 0, shape.start))
     outline = np.array(shape.outline)
     along = np.roll(outline, -1, axis=0) - outline

@@ -38,11 +38,14 @@ class Prism:
         In mm, counter-clockwise.
     start, end : float
         z of the two flat ends in mm.
+    holes : tuple of outlines
+        Inside the outline, clear of one another.
     """
 
     outline: tuple[Point, ...]
     start: float
     end: float
+    holes: tuple[tuple[Point, ...], ...] = ()
 
 
 @dataclass(frozen=True)

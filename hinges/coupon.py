@@ -1,0 +1,373 @@
+"""The tolerance coupon: a plate of hinges at several clearances, to find what a printer needs.
+
+One row of single hinges and one of double hinges (two axes in a row) hang on one frame that carries
+their clearances in raised numbers. The plate prints lying, without support. A maker turns every
+flap and notes the smallest number whose flaps move freely.
+
+.. code-block:: text
+
+    write_coupon(path, clearances=DEFAULT_CLEARANCES, *, length_mm=20.0, wall_mm=0.8,
+                 title="Hinge coupon", guide=True) -> list of the written paths
+
+The suffix of `path` decides the format: .3mf, .step, .stp or .stl. With `guide`, a one-page PDF
+beside it, ``<name>-guide.pdf``, tells how to read it.
+"""
+
+from __future__ import annotations
+
+import struct
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from build123d import Align, BasePartObject, Color, Mode, Part, Plane, Solid
+
+from .brep import build_half, build_shape, one_part, solids_of
+from .clearance import Clearance
+from .digits import number
+from .errors import FitError, HingeError
+from .leaf import Leaf
+from .mesh import MeshPart, half_of, part_of, solid_of
+from .plan import HalfPlan, SinglePlan, SingleSpec, plan_single
+from .plan_double import Matrix
+from .shapes import Shape, box
+
+if TYPE_CHECKING:
+    from build123d import RotationLike
+
+__all__ = ["DEFAULT_CLEARANCES", "Coupon", "write_coupon"]
+
+DEFAULT_CLEARANCES: Final[tuple[float, ...]] = (0.15, 0.20, 0.25, 0.30, 0.35, 0.40, 0.45, 0.50)
+"""In mm."""
+
+_THICK = 1.9  # of frame, leaves and flaps, mm
+_SPINE = 14.0  # width of the frame, mm
+_STAND = 5.0  # from the frame to the first axis, mm
+_FLAP = 7.0  # from an axis to the end of a flap, mm
+_LINK = 12.0  # between the two axes of a double hinge, mm
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One printed body: halves of hinges in their places, and plain shapes."""
+
+    name: str
+    halves: tuple[tuple[HalfPlan, Matrix], ...]
+    shapes: tuple[Shape, ...] = ()
+
+
+def _frame(x: float, y: float, z: float, side: float) -> Matrix:
+    """Lay a hinge's frame down: its axis along ±X, its upper side up, its child towards ±Y."""
+    matrix = np.eye(4)
+    matrix[:3, 0] = (0.0, side, 0.0)
+    matrix[:3, 1] = (0.0, 0.0, 1.0)
+    matrix[:3, 2] = (side, 0.0, 0.0)
+    matrix[:3, 3] = (x, y, z)
+    return matrix
+
+
+def _plan(clearance: float, length: float, width: float, wall: float) -> SinglePlan:
+    return plan_single(
+        SingleSpec.read(
+            length,
+            radius=3.0,
+            clearance=Clearance(clearance),
+            leaf=Leaf(width, _THICK, flat=True),
+            wall=wall,
+            chamfer=0.2,
+        )
+    )
+
+
+def plan_coupon(clearances: Sequence[float], length: float, wall: float) -> tuple[Piece, ...]:
+    """Plan every body of the coupon.
+
+    Parameters
+    ----------
+    clearances : sequence of float
+        In mm, at most three digits each.
+    length : float
+        Of each hinge in mm.
+    wall : float
+        Thinnest wall in mm.
+
+    Returns
+    -------
+    tuple of Piece
+        The frame first, then a flap, a link and the link's flap for each clearance.
+
+    Raises
+    ------
+    HingeError
+        If there are no clearances, or two alike.
+    FitError
+        If a clearance is too large for the coupon's hinges.
+    """
+    if not clearances or len(set(clearances)) != len(clearances):
+        raise HingeError("a coupon needs at least one clearance, and each only once")
+    pitch = length + 2.0
+    start = -0.5 * pitch * (len(clearances) - 1)
+    half = 0.5 * pitch * len(clearances)
+    spine = box(-half, half, -0.5 * _SPINE, 0.5 * _SPINE, 0.0, _THICK)
+    shapes: list[Shape] = [spine]
+    halves: list[tuple[HalfPlan, Matrix]] = []
+    flaps: list[Piece] = []
+    for index, clearance in enumerate(clearances):
+        x = start + index * pitch
+        try:
+            first = _plan(clearance, length, _FLAP, wall)
+            linked = _plan(clearance, length, 0.5 * _LINK + 1.0, wall)
+        except FitError as error:
+            raise FitError(
+                error.rule,
+                f"coupon hinge at {clearance:g} mm: {error.rule}",
+                error.value,
+                error.limit,
+                "leave this clearance out, or use longer hinges",
+                error.unit,
+            ) from error
+        level = first.spec.leaf.limits(first.train, first.spec.gap)[3]
+        near = 0.5 * _SPINE + _STAND
+        single = _frame(x, -near, level, -1.0)
+        lower = _frame(x, near, level, 1.0)
+        upper = _frame(x, near + _LINK, level, 1.0)
+        halves += [(first.parent, single), (linked.parent, lower)]
+        name = f"{clearance:.2f}"
+        flaps += [
+            Piece(f"single {name}", ((first.child, single),)),
+            Piece(f"link {name}", ((linked.child, lower), (linked.parent, upper))),
+            Piece(f"double {name}", ((first.child, upper),)),
+        ]
+        shapes += number(name, x, 0.0, _THICK)
+    return (Piece("frame", tuple(halves), tuple(shapes)), *flaps)
+
+
+class Coupon(BasePartObject):  # type: ignore[misc]
+    """A plate of single and double hinges at several clearances, on one frame.
+
+    The bed is the plane z = 0, the numbers are raised on the frame along x.
+
+    Parameters
+    ----------
+    clearances : sequence of float
+        In mm.
+    length : float
+        Of each hinge in mm.
+    wall : float
+        Thinnest wall in mm.
+    rotation, align, mode
+        As for every build123d part.
+
+    Attributes
+    ----------
+    clearances : tuple of float
+    names : tuple of str
+        Of the bodies, in the order of the solids.
+    meshes : tuple of MeshPart
+        The bodies as meshes that never take room from a clearance.
+
+    Raises
+    ------
+    FitError
+        If a clearance is too large for the coupon's hinges.
+    HingeError
+        If there are no clearances, or two alike.
+
+    Examples
+    --------
+    >>> coupon = Coupon([0.2, 0.3])
+    >>> coupon.names
+    ('frame', 'single 0.20', 'link 0.20', 'double 0.20', 'single 0.30', 'link 0.30', 'double 0.30')
+    """
+
+    def __init__(
+        self,
+        clearances: Sequence[float] = DEFAULT_CLEARANCES,
+        length: float = 20.0,
+        wall: float = 0.8,
+        rotation: RotationLike = (0, 0, 0),
+        align: Align | tuple[Align, Align, Align] | None = None,
+        mode: Mode = Mode.ADD,
+    ) -> None:
+        self.clearances = tuple(clearances)
+        self._pieces = plan_coupon(self.clearances, length, wall)
+        self.names = tuple(piece.name for piece in self._pieces)
+        super().__init__(part=self.make_coupon(), rotation=rotation, align=align, mode=mode)
+        self.label = "hinge coupon"
+        self.color = Color(0.2, 0.45, 0.7)
+
+    def make_coupon(self) -> Part:
+        """Build every body."""
+        return one_part(coupon_solids(self._pieces))
+
+    @cached_property
+    def meshes(self) -> tuple[MeshPart, ...]:
+        """The bodies as meshes, in the order of `names`."""
+        return coupon_meshes(self._pieces)
+
+
+def coupon_solids(pieces: Sequence[Piece]) -> list[Solid]:
+    """Build every body exactly.
+
+    Raises
+    ------
+    HingeError
+        If a body is not one solid.
+    """
+    built: dict[HalfPlan, Solid] = {}
+    solids = []
+    for piece in pieces:
+        parts = [build_shape(shape) for shape in piece.shapes]
+        for plan, matrix in piece.halves:
+            if plan not in built:
+                built[plan] = build_half(plan, piece.name).solid()
+            origin, x_dir, z_dir = (tuple(map(float, matrix[:3, k])) for k in (3, 0, 2))
+            frame = Plane(origin=origin, x_dir=x_dir, z_dir=z_dir)
+            parts.append(built[plan].moved(frame.location))
+        whole = solids_of(parts[0].fuse(*parts[1:]) if len(parts) > 1 else parts[0])
+        if len(whole) != 1:
+            raise HingeError(f"coupon: {piece.name} came out in {len(whole)} pieces")
+        solids += whole
+    return solids
+
+
+def coupon_meshes(pieces: Sequence[Piece], segments: int = 64) -> tuple[MeshPart, ...]:
+    """Build every body as a mesh.
+
+    Returns
+    -------
+    tuple of MeshPart
+    """
+    from manifold3d import Manifold, OpType
+
+    made = []
+    for piece in pieces:
+        parts = [solid_of(shape, segments, outside=False) for shape in piece.shapes]
+        for plan, matrix in piece.halves:
+            parts.append(half_of(plan, segments)[0].transform(matrix[:3]))
+        whole = Manifold.batch_boolean(parts, OpType.Add) if len(parts) > 1 else parts[0]
+        made.append(part_of(whole))
+    return tuple(made)
+
+
+def write_coupon(
+    path: Path | str,
+    clearances: Sequence[float] = DEFAULT_CLEARANCES,
+    *,
+    length_mm: float = 20.0,
+    wall_mm: float = 0.8,
+    title: str = "Hinge coupon",
+    guide: bool = True,
+) -> list[Path]:
+    """Write a coupon for the slicer or for CAD, and the page that tells how to read it.
+
+    Parameters
+    ----------
+    path : Path or str
+        Ends in .3mf, .step, .stp or .stl.
+    clearances : sequence of float
+        In mm.
+    length_mm : float
+        Of each hinge.
+    wall_mm : float
+        Thinnest wall.
+    title : str
+        For the file's metadata and the page's head, such as the name of the profile.
+    guide : bool
+        Write the page too.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    HingeError
+        If the suffix is unknown or the clearances cannot be used.
+    """
+    from .guide import write_guide
+
+    target = Path(path)
+    writers = {".3mf": _write_3mf, ".stl": _write_stl, ".step": _write_step, ".stp": _write_step}
+    writer = writers.get(target.suffix.lower())
+    if writer is None:
+        raise HingeError(
+            f"coupon file {target.name!r}: use a name that ends in {', '.join(sorted(writers))}"
+        )
+    pieces = plan_coupon(clearances, length_mm, wall_mm)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.with_name(f".part-{target.name}")
+    written = [target]
+    try:
+        writer(part, pieces, title)
+        part.replace(target)
+    finally:
+        part.unlink(missing_ok=True)
+    if guide:
+        page = target.with_name(f"{target.stem}-guide.pdf")
+        part = page.with_name(f".part-{page.name}")
+        try:
+            write_guide(part, tuple(clearances), coupon_meshes(pieces, 24), title)
+            part.replace(page)
+        finally:
+            part.unlink(missing_ok=True)
+        written.append(page)
+    return written
+
+
+def _joined(pieces: Sequence[Piece]) -> MeshPart:
+    """All bodies in one mesh, so that no slicer moves them apart."""
+    vertices, faces, count = [], [], 0
+    for mesh in coupon_meshes(pieces):
+        vertices.append(mesh.vertices)
+        faces.append(mesh.faces + count)
+        count += len(mesh.vertices)
+    return MeshPart(np.concatenate(vertices), np.concatenate(faces).astype(np.int32))
+
+
+def _write_3mf(path: Path, pieces: Sequence[Piece], title: str) -> None:
+    import lib3mf
+
+    mesh = _joined(pieces)
+    wrapper = lib3mf.get_wrapper()
+    model = wrapper.CreateModel()
+    model.SetUnit(lib3mf.ModelUnit.MilliMeter)
+    model.GetMetaDataGroup().AddMetaData("", "Title", title, "xs:string", True)
+    body = model.AddMeshObject()
+    body.SetName(title)
+    corners = [lib3mf.Position(tuple(map(float, point))) for point in mesh.vertices]
+    triangles = [lib3mf.Triangle(tuple(map(int, face))) for face in mesh.faces]
+    body.SetGeometry(corners, triangles)
+    space = uuid.uuid5(uuid.NAMESPACE_URL, f"hinges/{title}")
+    body.SetUUID(str(uuid.uuid5(space, "coupon")))
+    item = model.AddBuildItem(body, wrapper.GetIdentityTransform())
+    item.SetUUID(str(uuid.uuid5(space, "item")))
+    model.SetBuildUUID(str(uuid.uuid5(space, "build")))
+    model.QueryWriter("3mf").WriteToFile(str(path))
+
+
+def _write_stl(path: Path, pieces: Sequence[Piece], title: str) -> None:
+    mesh = _joined(pieces)
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    layout = [("normal", "<f4", 3), ("corner", "<f4", (3, 3)), ("extra", "<u2")]
+    rows = np.zeros(len(corners), dtype=layout)
+    rows["normal"], rows["corner"] = normals, corners
+    head = title.encode("ascii", "replace")[:79].ljust(80)
+    path.write_bytes(head + struct.pack("<I", len(rows)) + rows.tobytes())
+
+
+def _write_step(path: Path, pieces: Sequence[Piece], title: str) -> None:
+    from build123d import Compound, export_step
+
+    named = []
+    for piece, solid in zip(pieces, coupon_solids(pieces), strict=True):
+        solid.label = piece.name
+        named.append(solid)
+    export_step(Compound(label=title, children=named), path, timestamp="2000-01-01T00:00:00")
