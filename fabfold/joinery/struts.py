@@ -34,6 +34,8 @@ RESOLUTION = 20
 _AIR = 6.0
 #: Cost of a step beside the wall of the free space, where a bar would be trimmed.
 _TIGHT = 15.0
+#: Cost of a step right beside the wall of the free space that fades inwards.
+_EDGE = 3.0
 #: Core parts smaller than this many points are no terminals (a 64th of a cell).
 _LEAST_CORE = RESOLUTION**3 // 64
 
@@ -156,18 +158,21 @@ def _core_parts(pieces: list[Bools]) -> NDArray[np.int32]:
 def _terminals(
     grid: Grid, label: NDArray[np.int32], pieces: list[Bools], brackets: list[Bools]
 ) -> list[NDArray[np.int64]]:
-    """Flat point indices of every part that must hang together."""
+    """Flat point indices of every part that must hang together.
+
+    These are the hinge brackets, the pieces and what fills each cell most, each by the core part
+    that holds most of it: a piece of two lumps with a thread between them must not make the lumps
+    one. Of a part without any core (a thin blade) all points are taken.
+    """
+    flat_label, flat_cell = label.reshape(-1), grid.cell.reshape(-1)
     found = []
-    for bracket in brackets:
-        nodes = np.flatnonzero(bracket)
+    for part in [*brackets, *pieces]:
+        nodes = np.flatnonzero(part)
+        labels = flat_label[nodes]
+        if (labels > 0).any():
+            nodes = nodes[labels == np.bincount(labels[labels > 0]).argmax()]
         if len(nodes):
             found.append(nodes)
-    for piece in pieces:
-        nodes = np.flatnonzero(piece)
-        cored = label.reshape(-1)[nodes] > 0
-        if len(nodes):
-            found.append(nodes[cored] if cored.any() else nodes)
-    flat_label, flat_cell = label.reshape(-1), grid.cell.reshape(-1)
     for cell in range(int(grid.cell.max()) + 1):
         inside = np.flatnonzero((flat_cell == cell) & (flat_label > 0))
         if len(inside) == 0:
@@ -182,12 +187,7 @@ def _terminals(
 def _merge_by_core(
     terminals: list[NDArray[np.int64]], label: NDArray[np.int32]
 ) -> list[NDArray[np.int64]]:
-    """Unite terminals that lie in the same core part.
-
-    A terminal counts for the core part that holds most of it: a piece of two lumps with a thread
-    between them must not make the lumps one. A terminal without any core (a thin blade) hangs
-    together with what it shares points with.
-    """
+    """Unite terminals that lie in the same core part, or share points where they have none."""
     import networkx as nx
 
     flat = label.reshape(-1)
@@ -197,7 +197,7 @@ def _merge_by_core(
     for index, nodes in enumerate(terminals):
         parts = flat[nodes]
         if (parts > 0).any():
-            keys = [("core", int(np.bincount(parts[parts > 0]).argmax()))]
+            keys = [("core", int(parts.max()))]
         else:
             keys = [("point", int(node)) for node in nodes]
         for key in keys:
@@ -226,7 +226,10 @@ class _Ways:
         self.shape = free.shape
         passable = free | solid
         roomy = ndimage.binary_erosion(passable, np.ones((3, 3, 3), dtype=bool))
+        depth = ndimage.distance_transform_cdt(np.pad(passable, 1), metric="chessboard")
         cost = np.where(solid, 1.0, _AIR) + np.where(roomy, 0.0, _TIGHT)
+        # Of equal ways, the one in the middle of the room.
+        cost = cost + _EDGE / depth[1:-1, 1:-1, 1:-1].clip(1)
         self.passable, self.roomy = passable, roomy
         number = np.full(self.shape, -1, dtype=np.int64)
         self.nodes = np.flatnonzero(passable)
