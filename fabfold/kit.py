@@ -8,8 +8,8 @@ folder, every finished stage is kept there, and the same recipe goes on from wha
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -24,7 +24,6 @@ from fabfold.errors import (
     KitError,
     ModelError,
     NoFoldError,
-    NoTreeError,
 )
 from fabfold.files import sha256_of, write_bytes, write_text
 from fabfold.lattice import Template, load_template, rotation_about
@@ -35,6 +34,7 @@ from fabfold.store import StageStore, stage_key
 if TYPE_CHECKING:
     from fabfold.printing.checks import Check
     from fabfold.printing.profiles import Profile
+    from fabfold.rounds import Rounds
     from fabfold.solid.model import Solid
     from fabfold.tree.solve import Candidate
     from fabfold.voxels.model import Voxels
@@ -42,9 +42,6 @@ if TYPE_CHECKING:
 __all__ = ["Kit", "open_kit"]
 
 Result = TypeVar("Result")
-
-#: Seeds in one round of the search; a constant, so that results do not depend on the workers.
-SEEDS_PER_ROUND = 4
 
 
 class Kit:
@@ -166,7 +163,7 @@ class Kit:
         NoTreeError, NoFoldError
             If no round of the recipe finds one.
         """
-        _voxels, candidates = next(self._rounds())
+        _voxels, candidates = next(self._rounds().found())
         return candidates
 
     def fold(self) -> Attempt:
@@ -310,65 +307,27 @@ class Kit:
             profile.model_dump(mode="json"),
         )
 
-    def _rounds(self) -> Iterator[tuple[Voxels, list[Candidate]]]:
-        """Rounds of the search that found trees that fold; each takes the next voxelization."""
-        tried = 0
-        fitting = 0
-        why: NoTreeError | None = None
-        options = self.voxelize()
-        for number in range(self.recipe.rounds):
-            voxels = options[number % len(options)]
-            try:
-                candidates = self._round(number, voxels)
-            except NoTreeError as error:
-                why = error
-                continue
-            fitting += 1
-            if candidates:
-                tried += 1
-                yield voxels, candidates
-        if tried == 0 and fitting == 0 and why is not None:
-            raise why
-        if tried == 0:
-            raise NoFoldError(
-                f"no tree that folds in {self.recipe.rounds} rounds of {SEEDS_PER_ROUND} seeds; "
-                "try --effort thorough, more --rounds, another --seed or a larger template"
-            )
+    def _rounds(self) -> Rounds:
+        from fabfold.rounds import Rounds
 
-    def _round(self, number: int, voxels: Voxels) -> list[Candidate]:
-        from fabfold.fold.foldability import LatticeFoldability
-        from fabfold.search import search
-        from fabfold.stagefiles import load_candidates, save_candidates
-        from fabfold.tree.problem import Weights, from_features
-        from fabfold.tree.solve import EFFORTS
-        from fabfold.voxels.features import features
-
-        recipe = self.recipe
-        name = f"fit-{number:02d}"
-        weights = Weights(surface=recipe.surface_weight, single=recipe.single_weight)
-
-        def make(progress: Progress) -> list[Candidate]:
-            problem = from_features(voxels, features(voxels), self._template, weights)
-            first = recipe.seed * 10_000 + number * SEEDS_PER_ROUND
-            return search(
-                problem,
-                range(first, first + SEEDS_PER_ROUND),
-                LatticeFoldability(),
-                EFFORTS[recipe.effort],
+        if "rounds" not in self._results:
+            self._results["rounds"] = Rounds(
+                self.recipe,
+                self._template,
+                self.voxelize(),
+                key=self._voxels_key(),
+                store=self._store,
                 workers=self.workers,
-                progress=progress,
+                listening=self._listening,
             )
-
-        key = stage_key(
-            self._voxels_key(), recipe.surface_weight, recipe.single_weight, recipe.effort, number
-        )
-        return self._stage(name, key, make, partial(save_candidates, name), load_candidates)
+        result: Rounds = self._results["rounds"]
+        return result
 
     def _attempts(self) -> Iterator[Attempt]:
         """Every candidate of every round, best first, with its lattice path as a motion."""
         from fabfold.fold.motion import motion_of
 
-        for voxels, candidates in self._rounds():
+        for voxels, candidates in self._rounds().found():
             for candidate in candidates:
                 yield Attempt(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
 
@@ -398,6 +357,12 @@ class Kit:
         motion = replace(attempt.motion, certificate=certificate)
         return Made(replace(attempt, motion=motion), joinery, refused)
 
+    def _listening(self, name: str) -> AbstractContextManager[Progress]:
+        """Progress of a stage that is about to be made; the recipe is written before the first."""
+        if self.folder is not None:
+            write_text(self.folder / "kit.toml", self.recipe.to_toml())
+        return self.listener.stage(name)
+
     def _stage(
         self,
         name: str,
@@ -413,9 +378,7 @@ class Kit:
         if self._store.holds(name, key):
             result = load(self._store, self._store.files(name))
         else:
-            if self.folder is not None:
-                write_text(self.folder / "kit.toml", self.recipe.to_toml())
-            with self.listener.stage(name) as progress:
+            with self._listening(name) as progress:
                 result = make(progress)
             if self._store.folder is not None:
                 self._store.record(name, key, save(self._store, result))

@@ -13,6 +13,7 @@ from fabfold.files import write_json, write_npz
 from fabfold.fold.model import Motion
 from fabfold.joinery.model import BodyMesh, Joinery
 from fabfold.printing.checks import Check
+from fabfold.search import SeedResult
 from fabfold.solid.model import Solid
 from fabfold.store import StageStore
 from fabfold.tree.model import FoldTree
@@ -21,15 +22,15 @@ from fabfold.voxels.model import Voxels
 from fabfold.voxels.store import load_voxels, save_voxels
 
 __all__ = [
-    "load_candidates",
     "load_checks",
     "load_made",
     "load_options",
+    "load_seed",
     "load_solid",
-    "save_candidates",
     "save_checks",
     "save_made",
     "save_options",
+    "save_seed",
     "save_solid",
 ]
 
@@ -67,27 +68,36 @@ def load_options(store: StageStore, files: list[str]) -> list[Voxels]:
     return [load_voxels(store.path(name)) for name in files]
 
 
-def save_candidates(name: str, store: StageStore, candidates: list[Candidate]) -> list[str]:
-    """Write candidate trees with their lattice paths."""
-    file = f"{name}.json"
+def save_seed(store: StageStore, seed: int, result: SeedResult) -> list[str]:
+    """Write what one seed of the search found."""
+    file = f"seed-{seed}.json"
     entries = [
-        {"tree": c.tree.to_json(1.0, (0.0, 0.0, 0.0)), "path": c.path.tolist()} for c in candidates
+        {"tree": c.tree.to_json(1.0, (0.0, 0.0, 0.0)), "path": c.path.tolist(), "seed": c.seed}
+        for c in result.candidates
     ]
-    content = {"format": "fabfold-candidates", "version": 1, "candidates": entries}
+    content = {
+        "format": "fabfold-seed",
+        "version": 1,
+        "fits": result.fits,
+        "why": result.why,
+        "candidates": entries,
+    }
     write_json(store.path(file), content)
     return [file]
 
 
-def load_candidates(store: StageStore, files: list[str]) -> list[Candidate]:
-    """Read what :func:`save_candidates` wrote."""
-    data = json.loads(store.path(files[0]).read_text(encoding="utf-8"))
-    return [
+def load_seed(store: StageStore, seed: int) -> SeedResult:
+    """Read what :func:`save_seed` wrote."""
+    data = json.loads(store.path(f"seed-{seed}.json").read_text(encoding="utf-8"))
+    candidates = tuple(
         Candidate(
             tree=FoldTree.from_json(entry["tree"]),
             path=np.array(entry["path"], dtype=np.int32).reshape(-1, 2),
+            seed=entry["seed"],
         )
         for entry in data["candidates"]
-    ]
+    )
+    return SeedResult(candidates, data["fits"], data["why"])
 
 
 def save_made(store: StageStore, made: Made) -> list[str]:
