@@ -14,18 +14,18 @@ import numpy as np
 
 from fabfold.errors import ModelError
 from fabfold.files import sha256_of
+from fabfold.solid.convert import thinned, to_mesh
 from fabfold.solid.model import Solid
+from fabfold.solid.pieces import one_piece
 from fabfold.solid.raw import RawMesh
 from fabfold.solid.surface import OpenSurfaceError, close_surface
 from fabfold.solid.topology import Points
-from fabfold.solid.unite import one_piece, simplify, to_mesh, unite
+from fabfold.solid.unite import MAX_TRIANGLES, unite
 
 __all__ = ["FORMATS", "load_solid", "solid_from_mesh"]
 
 #: Suffixes that can be read.
 FORMATS = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".step", ".stp")
-#: Denser meshes are thinned: a box of some hundred voxels shows nothing of the rest.
-MAX_TRIANGLES = 200_000
 #: Smallest thickness of the whole model as a share of its longest side.
 MIN_THICKNESS = 0.01
 #: A 32-bit file must resolve the model at least this finely.
@@ -55,9 +55,10 @@ def load_solid(source: str | Path) -> Solid:
     -----
     The rules: overlapping shells are united (inside is where the winding number of the shells,
     each turned outwards, is at least 1); closed cavities are filled; loose pieces are dropped if
-    together they are at most 5 % of the volume, and refused otherwise; holes are capped where the
-    caps are small beside the surface; meshes above 200,000 triangles are thinned; a model thinner
-    than 1 % of its longest side is refused.
+    together they are at most 5 % of the volume, and refused otherwise (small ones that hang free
+    by a hair are moved to touch); holes are capped where the caps are small beside the surface;
+    meshes above 200,000 triangles are thinned; a model thinner than 1 % of its longest side is
+    refused.
     """
     text = str(source)
     if text.startswith("sample:"):
@@ -71,6 +72,8 @@ def load_solid(source: str | Path) -> Solid:
         digest = sha256_of(path)
     except OSError as error:
         raise ModelError(f"{path.name} cannot be read: {error.strerror or error}") from error
+    except MemoryError as error:
+        raise ModelError(f"{path.name} is too large for this computer's memory") from error
     return solid_from_mesh(path.stem, raw, digest, label=path.name)
 
 
@@ -133,10 +136,9 @@ def solid_from_mesh(name: str, raw: RawMesh, sha256: str = "", label: str = "") 
         shells, done = wrap_surface(label, vertices, raw.faces, str(error.args[0]))
     notes += done
     body = one_piece(label, unite(label, shells, notes), notes)
-    before = body.num_tri()
-    if before > MAX_TRIANGLES:
-        body = simplify(body, MAX_TRIANGLES)
-        notes.append(f"{before:,} triangles were thinned to {body.num_tri():,}")
+    body = thinned(body, MAX_TRIANGLES)
+    if len(raw.faces) > MAX_TRIANGLES:
+        notes.append(f"{len(raw.faces):,} triangles were thinned to {body.num_tri():,}")
     points, faces = to_mesh(body)
     return Solid(
         name=name,
@@ -148,21 +150,21 @@ def solid_from_mesh(name: str, raw: RawMesh, sha256: str = "", label: str = "") 
 
 
 def _check_numbers(label: str, raw: RawMesh) -> None:
-    if len(raw.faces) and (raw.faces.min() < 0 or raw.faces.max() >= len(raw.vertices)):
-        bad = int(np.flatnonzero((raw.faces < 0).any(1) | (raw.faces >= len(raw.vertices)).any(1))[0])
+    outside = ((raw.faces < 0) | (raw.faces >= len(raw.vertices))).any(axis=1)
+    if outside.any():
         raise ModelError(
-            f"{label}: triangle {bad} names a vertex that is not there "
-            f"(the file has {len(raw.vertices)}); export it again"
+            f"{label}: triangle {int(outside.argmax())} (counted from 0) names a vertex that is "
+            f"not there, the file has {len(raw.vertices)}; export the model again"
         )
     finite = np.isfinite(raw.vertices).all(axis=1)
     if not finite.all():
-        bad_vertex = int(np.flatnonzero(~finite)[0])
-        bad_faces = np.flatnonzero(~finite[raw.faces].all(axis=1))
-        where = f"; the first is triangle {bad_faces[0]}" if len(bad_faces) else ""
+        vertex = int(np.flatnonzero(~finite)[0])
+        hit = np.flatnonzero(~finite[raw.faces].all(axis=1))
+        first = f"triangle {hit[0]}, " if len(hit) else ""
         raise ModelError(
-            f"{label}: {len(bad_faces)} triangles have corners that are not finite numbers "
-            f"(NaN or infinite), the first such vertex is number {bad_vertex} counted from "
-            f"0{where}; repair or export the model again"
+            f"{label}: {len(hit)} triangles have corners that are no finite numbers (NaN or "
+            f"infinite), first {first}vertex {vertex} (counted from 0); repair or export the "
+            "model again"
         )
 
 

@@ -218,24 +218,38 @@ def read_step(path: Path) -> RawMesh:
             f"{path.name} is incomplete: a STEP file ends with END-ISO-10303-21, this one was cut "
             "off; export or download it again"
         )
-    try:
-        shape = build123d.import_step(path)
-    except Exception as error:  # the kernel reports bad files by exceptions of many types
-        raise ModelError(
-            f"{path.name} cannot be read as STEP ({str(error)[:160]}); export the model again"
-        ) from error
-    solids = list(shape.solids())
-    if not solids:
+    if not _has_faces(path):
         raise ModelError(
             f"{path.name} has no solid in it: only a solid body can be folded; export the part "
-            "itself, not its sketches or surfaces"
+            "itself, not an empty assembly or a sketch"
         )
-    notes = (f"{len(solids)} separate solids were read",) if len(solids) > 1 else ()
-    box = build123d.Compound(solids).bounding_box()
-    parts = [tessellate(solid, max(box.size.X, box.size.Y, box.size.Z)) for solid in solids]
+    try:
+        shape = build123d.import_step(path)
+        solids = list(shape.solids())
+        # Closed skins that were not declared solids are as good: the triangles tell.
+        bodies = solids or list(shape.faces())
+        size = build123d.Compound(bodies).bounding_box().size
+        parts = [tessellate(body, max(size.X, size.Y, size.Z)) for body in bodies]
+    except Exception as error:  # the kernel reports bad files by exceptions of many types
+        raise ModelError(
+            f"{path.name} cannot be read as STEP ({type(error).__name__}: {str(error)[:120]}); "
+            "export the model again"
+        ) from error
+    parts = [part for part in parts if len(part[1])]
+    if not parts:
+        raise ModelError(f"{path.name} has no solid in it: only a solid body can be folded")
+    notes = [f"the file has {len(solids)} separate solids"] if len(solids) > 1 else []
+    if not solids:
+        notes.append("the file has surfaces only, no solid; they were taken for its skin")
     offsets = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
     return RawMesh(
         np.concatenate([vertices for vertices, _ in parts]),
         np.concatenate([part[1] + offset for part, offset in zip(parts, offsets, strict=False)]),
-        notes,
+        tuple(notes),
     )
+
+
+def _has_faces(path: Path) -> bool:
+    """Whether a STEP file has faces at all; asked first, as the kernel prints what it thinks."""
+    with path.open("rb") as stream:
+        return any(b"FACE" in line.upper() for line in stream)

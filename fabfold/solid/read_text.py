@@ -103,19 +103,17 @@ def read_off(path: Path) -> RawMesh:
         raise ModelError(
             f"{path.name}, line {number}: expected the numbers of vertices and faces; {_AGAIN}"
         )
-    vertices: list[tuple[float, ...]] = []
-    polygons: list[list[int]] = []
-    for number, line in lines:  # noqa: B007 - the last number is told below
-        words = line.split()
-        if len(vertices) < counts[0]:
-            vertices.append(_numbers(path, number, words[:3]))
-        elif len(polygons) < counts[1]:
-            polygons.append(_off_face(path, number, words, counts[0]))
-    if len(vertices) < counts[0] or len(polygons) < counts[1]:
+    rest = list(lines)
+    if len(rest) < sum(counts):
         raise ModelError(
-            f"{path.name} ends early: the header says {counts[0]} vertices and {counts[1]} faces, "
-            f"the file has {len(vertices)} and {len(polygons)} (last line {number}); {_AGAIN}"
+            f"{path.name} ends early: its header says {counts[0]} vertices and {counts[1]} faces, "
+            f"but only {len(rest)} lines follow; {_AGAIN}"
         )
+    vertices = [_numbers(path, number, line.split()[:3]) for number, line in rest[: counts[0]]]
+    polygons = [
+        _off_face(path, number, line.split(), counts[0])
+        for number, line in rest[counts[0] : sum(counts)]
+    ]
     if not polygons:
         raise no_faces(path.name)
     corners_of = np.array(vertices, dtype=np.float64)

@@ -20,8 +20,9 @@ from fabfold.solid.topology import (
     weld,
     weld_rims,
 )
+from fabfold.solid.words import were
 
-__all__ = ["Shell", "close_surface"]
+__all__ = ["OpenSurfaceError", "Shell", "close_surface"]
 
 #: A patch whose caps would be larger than this share of its own area is a sheet, not a body.
 CAP_SHARE = 0.6
@@ -78,6 +79,9 @@ def close_surface(name: str, vertices: Points, faces: Faces) -> tuple[list[Shell
     if len(faces) == 0:
         raise ModelError(f"{name} has no volume: all its triangles are points or lines")
     edges = Edges.of(faces)
+    if edges.count.max() > 2:
+        faces = _drop_repeated(faces, notes)
+        edges = Edges.of(faces)
     if edges.closed:
         return _split(vertices, faces), notes
     if (edges.count == 1).sum() > SOUP_SHARE * len(edges.count):
@@ -86,10 +90,10 @@ def close_surface(name: str, vertices: Points, faces: Faces) -> tuple[list[Shell
             f"{len(edges.count)} edges have one face only, the {len(faces)} triangles are hardly "
             "joined; export the model as one closed solid"
         )
-    faces = _drop_faces(vertices, faces, notes)
-    faces, turned, one_sided = orient(faces)
+    faces = _drop_flat(vertices, faces, notes)
+    faces, turned, one_sided = orient(vertices, faces)
     if turned:
-        notes.append(f"{turned} triangles faced the wrong way and were turned")
+        notes.append(f"{were(turned, 'triangle')} facing the wrong way and turned")
     if one_sided:
         raise OpenSurfaceError("part of the surface is one-sided")
     edges = Edges.of(faces)
@@ -110,28 +114,31 @@ def _sew(vertices: Points, faces: Faces) -> Faces:
     return best
 
 
-def _drop_faces(vertices: Points, faces: Faces, notes: list[str]) -> Faces:
-    """Drop repeated faces and faces without area where the surface is more closed for it."""
+def _drop_repeated(faces: Faces, notes: list[str]) -> Faces:
+    """Drop faces between the same three vertices: all but one, or all where that closes more."""
     _, first, index, count = np.unique(
         np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
     )
-    if len(first) < len(faces):
-        once = faces[np.sort(first)]
-        never = faces[count[index.ravel()] == 1]
-        # Two equal faces are either written twice or are a wall inside the model.
-        wall = len(never) > 0 and Edges.of(never).odd < Edges.of(once).odd
-        kept = never if wall else once
-        notes.append(
-            f"{len(faces) - len(kept)} "
-            + ("triangles of inner walls were dropped" if wall else "repeated triangles were dropped")
-        )
-        faces = kept
+    if len(first) == len(faces):
+        return faces
+    once = faces[np.sort(first)]
+    never = faces[count[index.ravel()] == 1]
+    # Two equal faces are either written twice or are a wall inside the model.
+    wall = len(never) > 0 and Edges.of(never).odd < Edges.of(once).odd
+    kept = never if wall else once
+    dropped = were(len(faces) - len(kept), "inner triangle" if wall else "repeated triangle")
+    notes.append(f"{dropped} dropped" + (" (walls inside the model)" if wall else ""))
+    return kept
+
+
+def _drop_flat(vertices: Points, faces: Faces, notes: list[str]) -> Faces:
+    """Drop faces without area where the surface is more closed for it."""
     flat = face_areas(vertices, faces) < NO_AREA
     if flat.any() and not flat.all():
         rest = faces[~flat]
         if Edges.of(rest).odd < Edges.of(faces).odd:
-            notes.append(f"{int(flat.sum())} triangles without area were dropped")
-            faces = rest
+            notes.append(f"{were(int(flat.sum()), 'triangle')} dropped for want of an area")
+            return rest
     return faces
 
 
@@ -175,17 +182,15 @@ def _cap(vertices: Points, faces: Faces, notes: list[str]) -> list[Shell]:
     share = sheet_area / float(areas.sum())
     if not found or share > SHEET_SHARE:
         raise OpenSurfaceError(
-            f"{sheets} of its {len(parts)} surfaces are open sheets ({share:.0%} of the area)"
+            f"{sheets} of its {len(parts)} surfaces are open sheets, {share:.0%} of the area"
         )
     if holes:
-        notes.append(
-            f"{holes} {'hole was' if holes == 1 else 'holes were'} capped "
-            f"({cap_area / (areas.sum() + cap_area):.1%} of the surface)"
-        )
+        covered = cap_area / float(areas.sum() + cap_area)
+        notes.append(f"{were(holes, 'hole')} capped ({covered:.1%} of the surface)")
     if sheets:
         notes.append(
-            f"{sheets} open {'sheet' if sheets == 1 else 'sheets'} without thickness "
-            f"({share:.1%} of the surface) {'was' if sheets == 1 else 'were'} dropped"
+            f"{were(sheets, 'open sheet')} dropped for want of a thickness ({share:.1%} of the "
+            "surface)"
         )
     return found
 

@@ -90,14 +90,15 @@ def weld(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
 
 def _proper(faces: Faces) -> Faces:
     a, b, c = faces.T
-    return faces[(a != b) & (b != c) & (c != a)]
+    kept: Faces = faces[(a != b) & (b != c) & (c != a)]
+    return kept
 
 
 def weld_rims(vertices: Points, faces: Faces, tolerance: float) -> Faces:
     """Join vertices on open edges that lie within `tolerance` of each other."""
     edges = Edges.of(faces)
-    rim = np.unique(faces[edges.count[edges.of_side] == 1])
-    rim = np.union1d(rim, np.roll(faces, -1, axis=1)[edges.count[edges.of_side] == 1])
+    single = edges.count[edges.of_side] == 1
+    rim = np.union1d(faces[single], np.roll(faces, -1, axis=1)[single])
     if len(rim) == 0:
         return faces
     pairs = cKDTree(vertices[rim]).query_pairs(tolerance, output_type="ndarray")
@@ -144,8 +145,8 @@ def _components(count: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
     return label
 
 
-def orient(faces: Faces) -> tuple[Faces, int, int]:
-    """Wind the faces of every patch alike, after the majority of the patch.
+def orient(vertices: Points, faces: Faces) -> tuple[Faces, int, int]:
+    """Wind the faces of every patch alike, and outwards.
 
     Returns
     -------
@@ -159,7 +160,8 @@ def orient(faces: Faces) -> tuple[Faces, int, int]:
     -----
     Every face stands twice in a graph, once as it is and once turned over; faces joined by an
     edge are linked in the two ways that agree. A patch falls into two components of this graph,
-    one the mirror of the other, or into one if it is one-sided.
+    one the mirror of the other, or into one if it is one-sided. Of the two, the one with the
+    positive volume about the patch's own middle faces outwards.
     """
     count = len(faces)
     pairs, alike = _pairs_of_faces(Edges.of(faces))
@@ -169,10 +171,21 @@ def orient(faces: Faces) -> tuple[Faces, int, int]:
     links = np.column_stack([np.r_[first, first + count], np.r_[other, mirror]])
     label = _components(2 * count, links)
     kept, turned = label[:count], label[count:]
-    size = np.bincount(kept, minlength=int(label.max()) + 1)
-    # The component that holds more faces as they are wins; ties go to the smaller label.
-    lose = (size[kept] < size[turned]) | ((size[kept] == size[turned]) & (kept > turned))
-    return np.where(lose[:, None], faces[:, ::-1], faces), int(lose.sum()), int((kept == turned).sum())
+    flip = kept > turned
+    patch = np.minimum(kept, turned)
+    corners = vertices[faces]
+    middle = (
+        np.column_stack(
+            [np.bincount(patch, weights=corners[:, :, k].mean(axis=1)) for k in range(3)]
+        )
+        / np.maximum(np.bincount(patch), 1)[:, None]
+    )
+    corners = corners - middle[patch][:, None]
+    volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    total = np.bincount(patch, weights=np.where(flip, -volume, volume))
+    flip ^= total[patch] < 0
+    one_sided = int((kept == turned).sum())
+    return np.where(flip[:, None], faces[:, ::-1], faces), int(flip.sum()), one_sided
 
 
 def shells(faces: Faces) -> NDArray[np.int64]:

@@ -1,58 +1,39 @@
-"""Make one body of closed shells: union, self-crossings, cavities, loose pieces."""
+"""Make one body of closed shells: union, self-crossings, cavities."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fabfold.errors import ModelError
 from fabfold.meshes import mesh_volume
+from fabfold.solid.convert import (
+    from_mesh_set,
+    thinned,
+    to_manifold,
+    to_mesh,
+    to_mesh_set,
+)
 from fabfold.solid.surface import Shell
 from fabfold.solid.topology import Faces, Points
+from fabfold.solid.words import were
+from fabfold.solid.wrap import wrap
 
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["one_piece", "simplify", "to_manifold", "to_mesh", "unite"]
+__all__ = ["MAX_TRIANGLES", "unite"]
 
-#: Pieces that hang free are dropped if together they have at most this share of the volume.
-LOOSE_SHARE = 0.05
-#: A shell with less volume than this (longest side 1) is flat.
+#: Denser meshes are thinned: a box of some hundred voxels shows nothing of the rest.
+MAX_TRIANGLES = 200_000
+#: A shell with less volume than this (longest side about 1) is flat.
 NO_VOLUME = 1e-12
 #: Self-crossings are resolved exactly up to this many triangles; denser meshes are thinned first.
 CROSSING_LIMIT = 50_000
-
-
-def to_manifold(vertices: Points, faces: Faces) -> manifold3d.Manifold:
-    """A manifold3d object in double precision; its `status` tells whether it is one."""
-    import manifold3d
-
-    return manifold3d.Manifold(
-        manifold3d.Mesh64(
-            np.ascontiguousarray(vertices, dtype=np.float64),
-            np.ascontiguousarray(faces, dtype=np.uint64),
-        )
-    )
-
-
-def to_mesh(manifold: manifold3d.Manifold) -> tuple[Points, Faces]:
-    """Vertices (v, 3) float64 and faces (f, 3) int64 of a manifold3d object."""
-    mesh = manifold.to_mesh64()
-    return (
-        np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3].copy(),
-        np.asarray(mesh.tri_verts, dtype=np.int64),
-    )
-
-
-def simplify(manifold: manifold3d.Manifold, limit: int) -> manifold3d.Manifold:
-    """Thin a mesh (longest side about 1) to at most `limit` triangles, tolerance by tolerance."""
-    tolerance = 2e-5
-    while manifold.num_tri() > limit and tolerance < 0.01:
-        manifold = manifold.simplify(tolerance)
-        tolerance *= 2
-    return manifold
+#: Crossings that change the volume by less than this share are rounding, and left alone.
+SAME_VOLUME = 1e-6
 
 
 def unite(name: str, shells: Sequence[Shell], notes: list[str]) -> manifold3d.Manifold:
@@ -65,13 +46,14 @@ def unite(name: str, shells: Sequence[Shell], notes: list[str]) -> manifold3d.Ma
     name : str
         Name of the file, for messages.
     shells : sequence of Shell
+        Longest side of the whole about 1.
     notes : list of str
         What was done is appended.
 
     Returns
     -------
     manifold3d.Manifold
-        Perhaps of several pieces.
+        Perhaps of several pieces; without cavities.
 
     Raises
     ------
@@ -83,9 +65,9 @@ def unite(name: str, shells: Sequence[Shell], notes: list[str]) -> manifold3d.Ma
     volumes = [mesh_volume(shell.vertices, shell.faces.astype(np.int32)) for shell in shells]
     solid = [k for k in range(len(shells)) if abs(volumes[k]) > NO_VOLUME]
     if not solid:
-        raise ModelError(f"{name} is not a solid: its volume is zero; give its walls a thickness")
+        raise _no_volume(name)
     if len(solid) < len(shells):
-        notes.append(f"{len(shells) - len(solid)} surfaces without volume were dropped")
+        notes.append(f"{were(len(shells) - len(solid), 'surface')} dropped for want of a volume")
     bodies: dict[int, manifold3d.Manifold] = {}
     crossing = 0
     for k in solid:
@@ -93,39 +75,39 @@ def unite(name: str, shells: Sequence[Shell], notes: list[str]) -> manifold3d.Ma
         bodies[k], crossed = _sound(shells[k].vertices, faces)
         crossing += crossed
     if crossing:
-        notes.append("the surface passes through itself; the overlap counts as solid")
+        notes.append("the surface passes through itself; where it overlaps it counts as solid")
     inward = [k for k in solid if volumes[k] < 0]
     cavities = [
         k
         for k in inward
         if any(_contains(bodies[j], bodies[k]) for j in solid if volumes[j] > abs(volumes[k]))
     ]
-    if len(inward) > len(cavities):
+    if turned := len(inward) - len(cavities):
         notes.append(
             "the model was inside out and was turned"
             if len(solid) == 1
-            else f"{len(inward) - len(cavities)} of {len(solid)} shells were inside out and were turned"
+            else f"{were(turned, 'shell')} inside out (of {len(solid)}) and turned"
         )
-    rest = [k for k in solid if k not in cavities]
-    if len(rest) == 1:
-        united = bodies[rest[0]]
-    else:
-        united = manifold3d.Manifold.batch_boolean(
-            [bodies[k] for k in rest], manifold3d.OpType.Add
-        )
+    rest = [bodies[k] for k in solid if k not in cavities]
+    united = rest[0]
+    if len(rest) > 1:
+        united = manifold3d.Manifold.batch_boolean(rest, manifold3d.OpType.Add)
         notes.append(
-            f"{len(rest)} closed shells were united (inside is where at least one of them is)"
+            f"{were(len(rest), 'closed shell')} united; where they overlap they count as solid once"
         )
     united, hidden = _fill(united)
-    if cavities or hidden:
-        count = len(cavities) + hidden
+    if filled := len(cavities) + hidden:
         notes.append(
-            f"{count} closed {'cavity was' if count == 1 else 'cavities were'} filled: "
-            "nobody sees inside, and hinges need the material"
+            f"{were(filled, 'closed cavity')} filled, since nobody sees inside and the hinges need "
+            "the material"
         )
-    if united.num_tri() == 0:
-        raise ModelError(f"{name} is not a solid: its volume is zero; give its walls a thickness")
+    if united.num_tri() == 0 or united.volume() < NO_VOLUME:
+        raise _no_volume(name)
     return united
+
+
+def _no_volume(name: str) -> ModelError:
+    return ModelError(f"{name} is not a solid: its volume is zero; give its walls a thickness")
 
 
 def _contains(outer: manifold3d.Manifold, inner: manifold3d.Manifold) -> bool:
@@ -133,7 +115,7 @@ def _contains(outer: manifold3d.Manifold, inner: manifold3d.Manifold) -> bool:
     own_low, own_high = np.array(inner.bounding_box()).reshape(2, 3)
     if (own_low < low).any() or (own_high > high).any():
         return False
-    return bool((inner - outer).volume() < 1e-6 * inner.volume())
+    return bool((inner - outer).volume() < SAME_VOLUME * inner.volume())
 
 
 def _fill(united: manifold3d.Manifold) -> tuple[manifold3d.Manifold, int]:
@@ -141,7 +123,7 @@ def _fill(united: manifold3d.Manifold) -> tuple[manifold3d.Manifold, int]:
     import manifold3d
 
     parts = united.decompose()
-    solid = [part for part in parts if part.volume() > 0]
+    solid = [part for part in parts if part.volume() > NO_VOLUME]
     if len(solid) == len(parts):
         return united, 0
     hidden = sum(1 for part in parts if part.volume() < -NO_VOLUME)
@@ -151,67 +133,38 @@ def _fill(united: manifold3d.Manifold) -> tuple[manifold3d.Manifold, int]:
 def _sound(vertices: Points, faces: Faces) -> tuple[manifold3d.Manifold, bool]:
     """A manifold without self-crossings of one outward shell; whether there were any."""
     import manifold3d
-
-    body = to_manifold(vertices, faces)
-    broken = body.status() != manifold3d.Error.NoError
-    if not broken and not _crosses(vertices, faces):
-        return body, False
-    if not broken and body.num_tri() > CROSSING_LIMIT:
-        vertices, faces = to_mesh(simplify(body, CROSSING_LIMIT))
-    vertices, faces = _union_with_itself(vertices, faces)
-    return to_manifold(vertices, faces), True
-
-
-def _mesh_set(vertices: Points, faces: Faces) -> Any:
     import pymeshlab
 
-    meshes = pymeshlab.MeshSet()
-    meshes.add_mesh(pymeshlab.Mesh(vertices, faces.astype(np.int32)))
-    return meshes
+    body = to_manifold(vertices, faces)
+    good = body.status() == manifold3d.Error.NoError
+    if good:
+        if body.num_tri() > MAX_TRIANGLES:
+            body = thinned(body, MAX_TRIANGLES)
+            vertices, faces = to_mesh(body)
+        if not _crosses(vertices, faces):
+            return body, False
+        if body.num_tri() > CROSSING_LIMIT:
+            vertices, faces = to_mesh(thinned(body, CROSSING_LIMIT))
+    try:
+        clear = to_manifold(*_union_with_itself(vertices, faces))
+    except pymeshlab.PyMeshLabException:
+        clear = to_manifold(*wrap(vertices, faces))
+    if clear.status() != manifold3d.Error.NoError or clear.is_empty():
+        clear = to_manifold(*wrap(vertices, faces))
+    if good and abs(clear.volume() - body.volume()) < SAME_VOLUME * body.volume():
+        return body, False
+    return clear, True
 
 
 def _crosses(vertices: Points, faces: Faces) -> bool:
     """Whether faces of the mesh that share no vertex cross each other."""
-    meshes = _mesh_set(vertices, faces)
+    meshes = to_mesh_set(vertices, faces)
     meshes.compute_selection_by_self_intersections_per_face()
     return bool(meshes.current_mesh().selected_face_number() > 0)
 
 
 def _union_with_itself(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
     """The region round which the surface winds at least once, by exact arrangement (CGAL)."""
-    meshes = _mesh_set(vertices, faces)
+    meshes = to_mesh_set(vertices, faces)
     meshes.generate_boolean_union(first_mesh=0, second_mesh=0)
-    found = meshes.current_mesh()
-    return (
-        np.asarray(found.vertex_matrix(), dtype=np.float64),
-        np.asarray(found.face_matrix(), dtype=np.int64),
-    )
-
-
-def one_piece(
-    name: str, united: manifold3d.Manifold, notes: list[str]
-) -> manifold3d.Manifold:
-    """The largest piece, if the others are next to nothing.
-
-    Raises
-    ------
-    ModelError
-        If the other pieces have more than 5 % of the volume.
-    """
-    parts = sorted(united.decompose(), key=lambda part: -part.volume())
-    if len(parts) == 1:
-        return united
-    volumes = np.array([part.volume() for part in parts])
-    share = float(volumes[1:].sum() / volumes.sum())
-    if share > LOOSE_SHARE:
-        shares = ", ".join(f"{100 * volume / volumes.sum():.0f} %" for volume in volumes[:6])
-        raise ModelError(
-            f"{name} is not one piece: it falls into {len(parts)} that do not touch in a face "
-            f"({shares}{', …' if len(parts) > 6 else ''} of the volume); join them with struts in "
-            "your modelling program, or export one of them"
-        )
-    notes.append(
-        f"{len(parts) - 1} loose {'piece' if len(parts) == 2 else 'pieces'} "
-        f"({share:.2%} of the volume) {'was' if len(parts) == 2 else 'were'} dropped"
-    )
-    return parts[0]
+    return from_mesh_set(meshes)

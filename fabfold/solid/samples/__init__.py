@@ -69,9 +69,7 @@ def sample(name: str) -> Sample:
     try:
         return _SAMPLES[name]
     except KeyError:
-        raise ModelError(
-            f"no sample {name!r}: there are {', '.join(sample_names())}"
-        ) from None
+        raise ModelError(f"no sample {name!r}: there are {', '.join(sample_names())}") from None
 
 
 def build_sample(name: str) -> build123d.Part:

@@ -16,8 +16,18 @@ def ellipsoid(centre: Triple, radii: Triple, turn: Triple = (0, 0, 0)) -> Any:
     With two equal radii it is a surface of revolution, with three a sphere: the kernel unites
     these several times faster than general ellipsoids.
     """
-    from build123d import Axis, Ellipse, Location, Plane, Pos, Rectangle, Rot, Sphere
-    from build123d import revolve, scale
+    from build123d import (
+        Axis,
+        Ellipse,
+        Location,
+        Plane,
+        Pos,
+        Rectangle,
+        Rot,
+        Sphere,
+        revolve,
+        scale,
+    )
 
     x, y, z = radii
     place = Location(centre, turn)
@@ -57,9 +67,7 @@ def limb(points: Sequence[Triple], radii: Sequence[float]) -> Any:
     sections = []
     for point, radius in zip(points, radii, strict=True):
         tangent = line.tangent_at(Vector(*point))
-        sections.append(
-            Plane(origin=point, x_dir=_across(tangent), z_dir=tangent) * Circle(radius)
-        )
+        sections.append(Plane(origin=point, x_dir=_across(tangent), z_dir=tangent) * Circle(radius))
     return loft(sections).fuse(*ends)
 
 
@@ -91,5 +99,7 @@ def cylinder_y(centre: Triple, radius: float, width: float, round_by: float = 0.
 
     body = Cylinder(radius, width)
     if round_by:
-        body = fillet(body.edges().filter_by(lambda edge: edge.geom_type.name == "CIRCLE"), round_by)
+        body = fillet(
+            body.edges().filter_by(lambda edge: edge.geom_type.name == "CIRCLE"), round_by
+        )
     return Location(centre, (90, 0, 0)) * body

@@ -1,0 +1,118 @@
+"""What to do with pieces that hang free: join them over a hair, drop them, or refuse."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.errors import ModelError
+from fabfold.solid.convert import to_mesh
+from fabfold.solid.words import were
+
+if TYPE_CHECKING:
+    import manifold3d
+
+__all__ = ["HAIR", "LOOSE_SHARE", "one_piece"]
+
+#: A loose piece counts as small up to this share of the volume. Small pieces that cannot be
+#: joined are dropped if together they have at most this share, too.
+LOOSE_SHARE = 0.05
+#: Small pieces nearer than this (longest side about 1) are moved to touch the body.
+HAIR = 0.005
+#: Pieces nearer than this touch, in a point or along an edge.
+TOUCHING = 1e-9
+
+
+def one_piece(name: str, united: manifold3d.Manifold, notes: list[str]) -> manifold3d.Manifold:
+    """The largest piece, with small ones joined to it or dropped.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, for messages.
+    united : manifold3d.Manifold
+        Longest side about 1, without cavities.
+    notes : list of str
+        What was done is appended.
+
+    Raises
+    ------
+    ModelError
+        If there is a second piece of more than 5 % of the volume, or if the small pieces that
+        hang free have more than 5 % together.
+    """
+    parts = sorted(united.decompose(), key=lambda part: -part.volume())
+    if len(parts) == 1:
+        return united
+    volumes = np.array([part.volume() for part in parts])
+    shares = volumes / volumes.sum()
+    if shares[1] > LOOSE_SHARE:
+        raise _too_many(name, parts, shares)
+    body, loose = _join(parts)
+    if joined := len(parts) - 1 - len(loose):
+        notes.append(
+            f"{were(joined, 'piece')} free of the body by a hair (less than {HAIR:.1%} of the "
+            "model's length) and moved to touch it"
+        )
+    if loose:
+        share = float(shares[loose].sum())
+        if share > LOOSE_SHARE:
+            raise _too_many(name, parts, shares)
+        notes.append(f"{were(len(loose), 'loose piece')} dropped ({share:.2%} of the volume)")
+    return body
+
+
+def _join(parts: list[manifold3d.Manifold]) -> tuple[manifold3d.Manifold, list[int]]:
+    """The first part with all that is within a hair of it; the indices of the others."""
+    body, loose = parts[0], list(range(1, len(parts)))
+    while True:
+        for index in loose:
+            if body.min_gap(parts[index], HAIR) < HAIR:
+                merged = body + _moved(parts[index], body)
+                if len(merged.decompose()) == 1:
+                    body = merged
+                    loose.remove(index)
+                    break
+        else:
+            return body, loose
+
+
+def _moved(part: manifold3d.Manifold, body: manifold3d.Manifold) -> manifold3d.Manifold:
+    """A small part moved towards the body until it stands half a hair deep in it."""
+    gap = _nearest(part, body)
+    length = float(np.linalg.norm(gap))
+    if length < TOUCHING:
+        low, high = np.array(body.bounding_box()).reshape(2, 3)
+        own_low, own_high = np.array(part.bounding_box()).reshape(2, 3)
+        gap = (low + high) - (own_low + own_high)
+        return part.translate((gap * (HAIR / np.linalg.norm(gap))).tolist())
+    return part.translate((gap * (1 + HAIR / 2 / length)).tolist())
+
+
+def _nearest(part: manifold3d.Manifold, body: manifold3d.Manifold) -> NDArray[np.float64]:
+    """The shortest step from a corner of one to the surface of the other, pointing to the body."""
+    import trimesh
+
+    one, other = (trimesh.Trimesh(*to_mesh(shape), process=False) for shape in (part, body))
+    there, _, _ = trimesh.proximity.closest_point(other, one.vertices)
+    back, _, _ = trimesh.proximity.closest_point(one, other.vertices)
+    steps = np.concatenate([there - one.vertices, other.vertices - back])
+    nearest: NDArray[np.float64] = steps[int(np.linalg.norm(steps, axis=1).argmin())]
+    return nearest
+
+
+def _too_many(
+    name: str, parts: list[manifold3d.Manifold], shares: NDArray[np.float64]
+) -> ModelError:
+    told = [f"{share:.0%}" for share in shares if share >= 0.005][:6]
+    if len(parts) > len(told):
+        told.append(f"{len(parts) - len(told)} smaller")
+    touch = parts[0].min_gap(parts[1], HAIR) < TOUCHING
+    how = "touch in an edge or a corner only, which has no strength" if touch else "stand apart"
+    return ModelError(
+        f"{name} is not one piece: it falls into {len(parts)} pieces that {how} "
+        f"({', '.join(told)}; up to {LOOSE_SHARE:.0%} of the volume would be dropped); join them "
+        "with struts in your modelling program, or export one of them"
+    )

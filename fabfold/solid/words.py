@@ -1,0 +1,13 @@
+"""Small grammar for notes."""
+
+from __future__ import annotations
+
+__all__ = ["were"]
+
+
+def were(count: int, noun: str) -> str:
+    """``were(1, "hole")`` is "1 hole was", ``were(3, "hole")`` is "3 holes were"."""
+    if count == 1:
+        return f"1 {noun} was"
+    plural = noun[:-1] + "ies" if noun.endswith("y") else noun + "s"
+    return f"{count:,} {plural} were"
