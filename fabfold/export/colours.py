@@ -53,7 +53,7 @@ def _candidates() -> NDArray[np.uint8]:
     grid = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
     lab = _oklab(grid)
     chroma = np.hypot(lab[:, 1], lab[:, 2])
-    keep = (lab[:, 0] > 0.48) & (lab[:, 0] < 0.87) & (chroma > 0.06) & (chroma < 0.165)
+    keep = (lab[:, 0] > 0.52) & (lab[:, 0] < 0.87) & (chroma > 0.06) & (chroma < 0.165)
     return grid[keep].astype(np.uint8)
 
 
