@@ -20,7 +20,7 @@ class Effort:
     restarts : int
         Fresh starts of the folding phase; the search goes on to the next while none folds.
     removals : int
-        Large-neighbourhood moves, per start, that improve the energy before folding is looked at.
+        Large-neighbourhood moves, per start, until hinges that can turn join all the clusters.
     folding : int
         Candidates judged per start until one folds (phase A).
     polishing : int
@@ -44,7 +44,7 @@ class Effort:
     beam: int = 10
     roots: int = 100
     restarts: int = 6
-    removals: int = 0
+    removals: int = 30000
     folding: int = 2500
     polishing: int = 2500
     least: int = 4

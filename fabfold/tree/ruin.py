@@ -23,6 +23,7 @@ def ruin(
     pose: NDArray[np.int32],
     label: NDArray[np.int32],
     holder: NDArray[np.int32],
+    focus: NDArray[np.int32],
     least: int,
     most: int,
     generator: NDArray[np.uint64],
@@ -40,6 +41,8 @@ def ruin(
         Rigid cluster of each voxel.
     holder : (m,) int32 array
         Voxel in each template cell, -1 for none.
+    focus : (k,) int32 array
+        Voxels to start from; empty for all.
     least, most : int
         Number of voxels wanted.
     out : (n,) bool array
@@ -54,9 +57,12 @@ def ruin(
     out[:] = False
     chosen = 0
     want = least + random_below(generator, most - least + 1)
+    first = random_below(generator, count)
+    if len(focus) > 0:
+        first = focus[random_below(generator, len(focus))]
     how = random_float(generator)
     if how < 0.65:
-        here = label[random_below(generator, count)]
+        here = label[first]
         shift = random_below(generator, count)
         for k in range(count):
             u = (k + shift) % count
@@ -84,7 +90,6 @@ def ruin(
         # The rest comes from the edges of what is already out.
         if chosen >= least:
             return chosen
-    first = random_below(generator, count)
     if not out[first]:
         out[first] = True
         chosen += 1
@@ -121,6 +126,7 @@ def propose(
     hinges: HingeTables,
     loose: float,
     threshold: float,
+    focus: NDArray[np.int32],
     tries: int,
     least: int,
     most: int,
@@ -142,6 +148,8 @@ def propose(
     loose : float
         Penalty for each piece, after the first, into which hinges that can turn leave the whole.
     threshold : float
+    focus : (k,) int32 array
+        Voxels to start removals from; empty for all.
     tries : int
         Most removals tried.
     least, most : int
@@ -158,8 +166,8 @@ def propose(
         Removals tried; 0 is never returned.
     energy : float
         Of `out`, with the penalty; infinite when nothing was found.
-    found : int
-        Rigid clusters of `out`.
+    left : int
+        Pieces of `out`, less one, as counted by the penalty.
     """
     count = len(pose)
     label = np.empty(count, np.int32)
@@ -173,7 +181,7 @@ def propose(
     results = np.empty((width, count), np.int32)
     start = np.empty(count, np.int32)
     for attempt in range(tries):
-        chosen = ruin(tables, pose, label, holder, least, most, generator, gone)
+        chosen = ruin(tables, pose, label, holder, focus, least, most, generator, gone)
         if chosen >= count:
             gone[random_below(generator, count)] = False
             chosen -= 1
@@ -190,7 +198,7 @@ def propose(
         )
         best = np.inf
         best_row = -1
-        best_found = 0
+        best_left = 0
         for r in range(rows):
             same = True
             for v in range(count):
@@ -199,18 +207,19 @@ def propose(
                     break
             if same:
                 continue
-            energy, found = energy_of(tables, results[r], empty_face)
+            energy, _ = energy_of(tables, results[r], empty_face)
             if energy > threshold or energy >= best or apart(tables, results[r]) > 0:
                 continue
             total, rows_found = candidates(tables, results[r], hinges, new_label, hinge)
-            energy += loose * loose_pieces(hinge, rows_found, total, 4, generator)
+            left = loose_pieces(hinge, rows_found, total, 4, generator)
+            energy += loose * left
             if energy <= threshold and energy < best:
                 best = energy
                 best_row = r
-                best_found = found
+                best_left = left
         if best_row >= 0:
             out[:] = results[best_row]
-            return attempt + 1, best, best_found
+            return attempt + 1, best, best_left
     return tries, np.inf, 0
 
 

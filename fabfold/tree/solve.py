@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,9 @@ class Statistics:
     log: list[str] = field(default_factory=list)
 
 
+_NOWHERE = np.empty(0, np.int32)
+
+
 @dataclass(frozen=True)
 class _State:
     """Full poses, their hinges, and what the objective says of them."""
@@ -72,6 +75,7 @@ class _State:
     energy: float
     tree: SpanningTree | None
     penalty: float
+    focus: NDArray[np.int32] = field(default_factory=lambda: _NOWHERE)
 
 
 @dataclass(frozen=True)
@@ -80,16 +84,19 @@ class _Scale:
 
     stuck: float
     cost: float
+    joint: float
     hot: float
     cold: float
+    focus: float = 0.5
+    loose: float = 10.0
 
 
 def _scale(voxels: int) -> _Scale:
     # A hinge that cannot move must cost about as much as the energy a few joints bring; large
     # problems need the penalty to rule, or the energy freezes before anything folds.
     if voxels <= 72:
-        return _Scale(stuck=0.15, cost=1.0, hot=0.15, cold=0.02)
-    return _Scale(stuck=1.0, cost=0.2, hot=0.1, cold=0.01)
+        return _Scale(stuck=0.15, cost=1.0, joint=0.1, hot=0.15, cold=0.02)
+    return _Scale(stuck=1.0, cost=0.2, joint=0.1, hot=0.1, cold=0.01)
 
 
 def grow(
@@ -161,43 +168,50 @@ class _Search:
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
         self.generator = generator(int(self.rng.integers(2**62)))
         self.scale = _scale(len(problem))
+        weight = np.array([0.0] + [self.scale.joint] * 4)
+        self.tables = problem.tables._replace(weight=weight)
         self.results: list[_State] = []
 
     # --- moves -----------------------------------------------------------------------------
 
     def neighbour(
-        self, pose: NDArray[np.int32], threshold: float, tries: int, loose: float
-    ) -> tuple[NDArray[np.int32], float] | None:
-        """Other poses with energy (and penalty for loose pieces) of at most `threshold`."""
+        self,
+        pose: NDArray[np.int32],
+        threshold: float,
+        tries: int,
+        loose: float,
+        focus: NDArray[np.int32] = _NOWHERE,
+    ) -> tuple[NDArray[np.int32], float, int] | None:
+        """Other poses with energy, and penalty for loose pieces, of at most `threshold`.
+
+        Returns
+        -------
+        (pose, energy, loose pieces) or None
+        """
         effort = self.effort
         out = np.empty(len(pose), np.int32)
-        used, energy, _ = propose(
-            self.problem.tables, pose, self.problem.empty_face, hinge_tables(), loose, threshold,
-            tries, effort.least, min(effort.most, len(pose)), effort.rebeam, 0.05, 1.0,
+        used, energy, left = propose(
+            self.tables, pose, self.problem.empty_face, hinge_tables(), loose, threshold,
+            focus, tries, effort.least, min(effort.most, len(pose)), effort.rebeam, 0.05, 1.0,
             self.generator, out,
         )  # fmt: skip
         self.statistics.removals += used
-        return None if math.isinf(energy) else (out, energy)
+        return None if math.isinf(energy) else (out, energy, left)
 
     def hang_together(self, pose: NDArray[np.int32]) -> _State | None:
-        """Improve grown poses until hinges that can turn join all the clusters."""
-
-        def loose_of(poses: NDArray[np.int32]) -> int:
-            choice = hinge_choice(self.problem, poses)
-            found, total = choice.found, choice.clusters
-            return int(loose_pieces(found, len(found), total, 8, self.generator))
-
-        loose = 0.5
-        energy, _ = energy_of(self.problem.tables, pose, self.problem.empty_face)
-        value = energy + loose * loose_of(pose)
-        for _ in range(40):
-            left = loose_of(pose)
-            if left == 0:
-                return _State(pose, value, None, 0.0)
-            found = self.neighbour(pose, value + 0.05, 200, loose)
-            if found:
-                pose, value = found
-        return None
+        """Anneal grown poses until hinges that can turn join all the clusters."""
+        loose = 2.0
+        choice = hinge_choice(self.problem, pose)
+        rows = choice.found
+        left = int(loose_pieces(rows, len(rows), choice.clusters, 8, self.generator))
+        value, _ = energy_of(self.tables, pose, self.problem.empty_face)
+        value += loose * left
+        last = self.statistics.removals + self.effort.removals
+        while left > 0 and self.statistics.removals < last:
+            found = self.neighbour(pose, value + 0.3 * self.rng.exponential(), 100, loose)
+            if found is not None:
+                pose, value, left = found
+        return None if left else _State(pose, value, None, 0.0)
 
     def trees(
         self, choice: HingeChoice, keys: set[tuple[int, int]], count: int
@@ -205,21 +219,25 @@ class _Search:
         """Random spanning trees; the first ones keep most of the hinges in `keys`."""
         for k in range(count):
             bonus = (2.0, 0.7, 0.0)[min(k, 2)] if keys else 0.0
-            tree = choice.tree(choice.wanted(keys, bonus), self.generator)
-            if tree is not None:
-                self.statistics.trees += 1
-                yield tree
+            wanted = choice.wanted(keys, bonus)
+            for _ in range(8):
+                # Hinges on one lattice edge exclude each other, so a random choice may not span.
+                tree = choice.tree(wanted, self.generator)
+                if tree is not None:
+                    self.statistics.trees += 1
+                    yield tree
+                    break
 
     # --- judging ---------------------------------------------------------------------------
 
-    def unresolved(self, tree: SpanningTree) -> float:
-        """Share of planner levels unresolved, with a long look where little is missing."""
+    def remaining(self, tree: SpanningTree) -> NDArray[np.int32]:
+        """Quarter turns of each hinge that the planner leaves, with a long look where few are."""
         self.statistics.glances += 1
-        share = self.judge.unresolved(tree.system, self.effort.glance)
-        if 0.0 < share <= self.effort.near:
+        left = self.judge.remaining(tree.system, self.effort.glance)
+        if 0 < left.sum() <= self.effort.near * 2 * len(left):
             self.statistics.looks += 1
-            share = self.judge.unresolved(tree.system, self.effort.look)
-        return share
+            left = self.judge.remaining(tree.system, self.effort.look)
+        return left
 
     def judged(
         self, pose: NDArray[np.int32], energy: float, keys: set[tuple[int, int]], bound: float
@@ -227,21 +245,24 @@ class _Search:
         """The best spanning tree for these poses, or None where its penalty exceeds `bound`."""
         choice = hinge_choice(self.problem, pose)
         self.statistics.judged += 1
-        best: SpanningTree | None = None
-        least = math.inf
+        best: _State | None = None
         for tree in self.trees(choice, keys, self.effort.trees):
-            from_a, from_b = self.judge.stuck(tree.system)
-            penalty = self.scale.stuck * (from_a + from_b)
+            stuck = self.judge.stuck_hinges(tree.system)
+            penalty = self.scale.stuck * float(stuck.sum())
+            trouble = stuck.any(axis=0)
             if penalty == 0:
                 self.statistics.closed += 1
-                penalty = self.scale.stuck * self.unresolved(tree)
-            if penalty < least:
-                best, least = tree, penalty
-            if least == 0:
+                left = self.remaining(tree)
+                trouble = left > 0
+                penalty = self.scale.stuck * float(left.sum()) / (2 * len(left))
+            if best is None or penalty < best.penalty:
+                focus = np.unique(tree.joints[trouble, :2]).astype(np.int32)
+                best = _State(pose, energy, tree, penalty, focus)
+            if penalty == 0:
                 break
-        if best is None or least > bound:
+        if best is None or best.penalty > bound:
             return None
-        return _State(pose, energy, best, least)
+        return best
 
     # --- phases ----------------------------------------------------------------------------
 
@@ -259,13 +280,14 @@ class _Search:
             slack = heat * self.rng.exponential()
             value = scale.cost * now.energy + now.penalty + slack
             assert now.tree is not None
-            if self.rng.random() < 0.25:
+            if self.rng.random() < 0.05:
                 pose, energy = now.pose, now.energy
             else:
-                found = self.neighbour(now.pose, value / scale.cost, 20, 10.0)
+                focus = now.focus if self.rng.random() < scale.focus else _NOWHERE
+                found = self.neighbour(now.pose, value / scale.cost, 20, 10.0, focus)
                 if found is None:
                     continue
-                pose, energy = found
+                pose, energy, _ = found
             fresh = self.judged(pose, energy, now.tree.keys, value - scale.cost * energy)
             if fresh is not None:
                 now = fresh
@@ -273,8 +295,9 @@ class _Search:
 
     def polish(self, start: _State) -> None:
         """Phase B: anneal the energy among trees that the planner folds."""
-        scale = self.scale
-        now = start
+        self.tables = self.problem.tables
+        energy, _ = energy_of(self.tables, start.pose, self.problem.empty_face)
+        now = replace(start, energy=energy)
         self.results.append(now)
         best = now.energy
         steps = self.effort.polishing
@@ -285,7 +308,7 @@ class _Search:
             if found is None:
                 continue
             assert now.tree is not None
-            fresh = self.judged(*found, now.tree.keys, 0.0)
+            fresh = self.judged(found[0], found[1], now.tree.keys, 0.0)
             if fresh is None:
                 continue
             now = fresh
@@ -293,7 +316,6 @@ class _Search:
             if now.energy < best + 0.1:
                 best = min(best, now.energy)
                 self.results.append(now)
-        del scale
 
     def run(self) -> list[Candidate]:
         """All the phases."""
