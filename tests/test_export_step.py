@@ -99,6 +99,43 @@ def test_holes_and_cavities_keep_their_volume(tmp_path):
     assert len(solid.faces()) == 6 + 4 + 24
 
 
+def test_a_body_that_the_kernel_refuses_is_written_flat(tmp_path, monkeypatch):
+    from fabfold.export import step
+
+    tree = row_tree()
+    joinery = row_joinery(tree, bump=False)
+    measured = step._measured
+    refused = []
+
+    def strict(text: str) -> tuple[bool, float]:
+        if "'body-01'" in text and "CYLINDRICAL_SURFACE" in text:
+            refused.append(text)
+            return False, 0.0
+        return measured(text)
+
+    monkeypatch.setattr(step, "_measured", strict)
+    facts = write_step(tmp_path / "row.step", joinery, tree)
+    assert len(refused) == 1
+    assert facts.plain == ("body-01",)
+    solids = _read(tmp_path / "row.step").solids()
+    assert all(_valid(solid) for solid in solids)
+    kinds = [{face.geom_type.name for face in solid.faces()} for solid in solids]
+    assert kinds[1] == {"PLANE"}
+    assert kinds[2] == {"PLANE", "CYLINDER"}
+
+
+def test_triangles_alone_make_a_valid_solid(tmp_path, monkeypatch):
+    from fabfold.export import step
+
+    monkeypatch.setattr(step, "_LEVELS", ("triangles",))
+    ball = m3.Manifold.sphere(10, 24) - m3.Manifold.cube((10, 10, 10))
+    write_step(tmp_path / "ball.step", _joinery(ball))
+    (solid,) = _read(tmp_path / "ball.step").solids()
+    assert _valid(solid)
+    assert len(solid.faces()) == ball.num_tri()
+    assert solid.volume == pytest.approx(ball.volume(), rel=1e-4)
+
+
 def test_a_mesh_that_is_no_solid_is_named(tmp_path):
     vertices, faces = _mesh(m3.Manifold.cube((1, 1, 1)))
     joinery = _joinery(m3.Manifold.cube((1, 1, 1)))
