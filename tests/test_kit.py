@@ -52,8 +52,8 @@ def test_a_kit_has_every_file(kit):
 
 
 def test_the_bar_folds_into_the_box(kit):
-    tree = FoldTree.from_json(json.loads((kit.folder / "tree.json").read_text()))
-    motion = Motion.from_json(json.loads((kit.folder / "motion.json").read_text()))
+    tree = FoldTree.from_json(json.loads((kit.folder / "tree.json").read_text(encoding="utf-8")))
+    motion = Motion.from_json(json.loads((kit.folder / "motion.json").read_text(encoding="utf-8")))
     assert len(tree.source) == 8
     assert {tuple(cell) for cell in tree.target} == {tuple(c) for c in tree.template.cells}
     np.testing.assert_array_equal(motion.angles_deg[-1], tree.fold_angles)
@@ -72,7 +72,7 @@ def test_bodies_are_single_closed_pieces_as_many_as_in_the_tree(kit):
 
 
 def test_every_check_passes_and_is_reported_with_its_figure(kit):
-    report = json.loads((kit.folder / "report.json").read_text())
+    report = json.loads((kit.folder / "report.json").read_text(encoding="utf-8"))
     assert report["format"] == "fabfold-report"
     assert {check.name for check in kit.check()} == {c["name"] for c in report["checks"]}
     assert all(check.ok for check in kit.check()), [c for c in kit.check() if not c.ok]
@@ -137,7 +137,7 @@ def test_interrupt_leaves_what_is_done_and_goes_on(bar, tmp_path):
     run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     journal = folder / "stages" / "journal.json"
     deadline = time.monotonic() + 120
-    while not (journal.is_file() and "voxelize" in journal.read_text()):
+    while not (journal.is_file() and "voxelize" in journal.read_text(encoding="utf-8")):
         assert run.poll() is None and time.monotonic() < deadline, run.stderr.read()
         time.sleep(0.02)
     os.kill(run.pid, signal.SIGINT)
@@ -170,7 +170,7 @@ def test_grid_placement_by_hand(bar):
 
 def test_a_recipe_without_its_model_says_where_to_put_it(kit, tmp_path):
     recipe = tmp_path / "kit.toml"
-    recipe.write_text((kit.folder / "kit.toml").read_text())
+    recipe.write_text((kit.folder / "kit.toml").read_text(encoding="utf-8"))
     with pytest.raises(ModelError, match=r"bar\.stl"):
         open_kit(str(recipe), folder=tmp_path / "new")
 
