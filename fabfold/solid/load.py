@@ -151,12 +151,12 @@ def solid_from_mesh(name: str, raw: RawMesh, sha256: str = "", label: str = "") 
 
 def _check_numbers(label: str, raw: RawMesh) -> None:
     outside = ((raw.faces < 0) | (raw.faces >= len(raw.vertices))).any(axis=1)
-    if outside.any():
+    if bool(np.any(outside)):
         raise ModelError(
-            f"{label}: triangle {int(outside.argmax())} (counted from 0) names a vertex that is "
+            f"{label}: triangle {int(np.argmax(outside))} (counted from 0) names a vertex that is "
             f"not there, the file has {len(raw.vertices)}; export the model again"
         )
-    finite = np.isfinite(raw.vertices).all(axis=1)
+    finite = np.asarray(np.isfinite(raw.vertices).all(axis=1))
     if not finite.all():
         vertex = int(np.flatnonzero(~finite)[0])
         hit = np.flatnonzero(~finite[raw.faces].all(axis=1))
@@ -173,7 +173,9 @@ def _normalised(label: str, raw: RawMesh) -> tuple[Points, Points, float]:
 
     Models come a nanometre or a thousand kilometres long: all tolerances hold for this frame.
     """
-    used = raw.vertices[np.unique(raw.faces)]
+    in_use = np.zeros(len(raw.vertices), dtype=bool)
+    in_use[raw.faces] = True
+    used = raw.vertices[in_use]
     low, high = used.min(axis=0), used.max(axis=0)
     longest = float((high - low).max())
     far = float(np.abs(used).max())

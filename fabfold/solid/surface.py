@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import ModelError
 from fabfold.solid.polygon import triangulate_loop
+from fabfold.solid.sew import sew
 from fabfold.solid.topology import (
     Edges,
     Faces,
@@ -18,7 +19,6 @@ from fabfold.solid.topology import (
     patches,
     shells,
     weld,
-    weld_rims,
 )
 from fabfold.solid.words import were
 
@@ -28,8 +28,6 @@ __all__ = ["OpenSurfaceError", "Shell", "close_surface"]
 CAP_SHARE = 0.6
 #: Sheets are dropped if together they have at most this share of the whole area.
 SHEET_SHARE = 0.15
-#: Rims of neighbouring faces are joined over gaps of at most these shares of the longest side.
-RIM_TOLERANCES = (1e-7, 1e-6, 1e-5, 1e-4)
 #: A surface with a larger share of open edges than this is a soup of triangles.
 SOUP_SHARE = 0.5
 #: Faces with an area of less than this times the square of the longest side count as none.
@@ -75,7 +73,7 @@ def close_surface(name: str, vertices: Points, faces: Faces) -> tuple[list[Shell
     notes: list[str] = []
     vertices, faces = weld(vertices, faces)
     if len(faces) and not Edges.of(faces).closed:
-        faces = _sew(vertices, faces)
+        faces = sew(vertices, faces)
     if len(faces) == 0:
         raise ModelError(f"{name} has no volume: all its triangles are points or lines")
     edges = Edges.of(faces)
@@ -100,18 +98,6 @@ def close_surface(name: str, vertices: Points, faces: Faces) -> tuple[list[Shell
     if edges.closed:
         return _split(vertices, faces), notes
     return _cap(vertices, faces, notes), notes
-
-
-def _sew(vertices: Points, faces: Faces) -> Faces:
-    """Join open rims over small gaps, with the smallest tolerance that leaves fewest open edges."""
-    best, fewest = faces, Edges.of(faces).odd
-    for tolerance in RIM_TOLERANCES:
-        if fewest == 0:
-            break
-        sewn = weld_rims(vertices, faces, tolerance)
-        if len(sewn) and (odd := Edges.of(sewn).odd) < fewest:
-            best, fewest = sewn, odd
-    return best
 
 
 def _drop_repeated(faces: Faces, notes: list[str]) -> Faces:

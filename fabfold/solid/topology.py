@@ -12,17 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 __all__ = [
     "Edges",
-    "drop_unused",
     "face_areas",
     "orient",
     "patches",
+    "proper",
     "shells",
     "weld",
-    "weld_rims",
 ]
 
 Faces = NDArray[np.int64]
@@ -85,37 +83,14 @@ def weld(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
     fresh[1:] = (ranked[1:] != ranked[:-1]).any(axis=1)
     number = np.empty(len(points), dtype=np.int64)
     number[order] = np.cumsum(fresh) - 1
-    return ranked[fresh], _proper(number[faces])
+    return ranked[fresh], proper(number[faces])
 
 
-def _proper(faces: Faces) -> Faces:
+def proper(faces: Faces) -> Faces:
+    """The faces with three different vertices."""
     a, b, c = faces.T
     kept: Faces = faces[(a != b) & (b != c) & (c != a)]
     return kept
-
-
-def weld_rims(vertices: Points, faces: Faces, tolerance: float) -> Faces:
-    """Join vertices on open edges that lie within `tolerance` of each other."""
-    edges = Edges.of(faces)
-    single = edges.count[edges.of_side] == 1
-    rim = np.union1d(faces[single], np.roll(faces, -1, axis=1)[single])
-    if len(rim) == 0:
-        return faces
-    pairs = cKDTree(vertices[rim]).query_pairs(tolerance, output_type="ndarray")
-    if len(pairs) == 0:
-        return faces
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(rim), len(rim)))
-    _, label = connected_components(graph, directed=False)
-    _, first = np.unique(label, return_index=True)
-    number = np.arange(len(vertices))
-    number[rim] = rim[first[label]]
-    return _proper(number[faces])
-
-
-def drop_unused(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
-    """Drop vertices that no face uses."""
-    used, renumbered = np.unique(faces.ravel(), return_inverse=True)
-    return vertices[used], renumbered.reshape(-1, 3)
 
 
 def face_areas(vertices: Points, faces: Faces) -> NDArray[np.float64]:
@@ -127,8 +102,8 @@ def face_areas(vertices: Points, faces: Faces) -> NDArray[np.float64]:
 
 def _pairs_of_faces(edges: Edges) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Faces joined by an edge of exactly two, shape (p, 2), and whether they are wound alike."""
-    sides = np.flatnonzero(edges.count[edges.of_side.ravel()] == 2)
-    sides = sides[np.argsort(edges.of_side.ravel()[sides], kind="stable")].reshape(-1, 2)
+    found = np.flatnonzero(edges.count[edges.of_side.ravel()] == 2)
+    sides = found[np.argsort(edges.of_side.ravel()[found], kind="stable")].reshape(-1, 2)
     signs = edges.sign.ravel()[sides]
     return sides // 3, signs[:, 0] != signs[:, 1]
 

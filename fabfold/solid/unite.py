@@ -17,7 +17,7 @@ from fabfold.solid.convert import (
     to_mesh_set,
 )
 from fabfold.solid.surface import Shell
-from fabfold.solid.topology import Faces, Points
+from fabfold.solid.topology import Edges, Faces, Points
 from fabfold.solid.words import were
 from fabfold.solid.wrap import wrap
 
@@ -137,11 +137,14 @@ def _sound(vertices: Points, faces: Faces) -> tuple[manifold3d.Manifold, bool]:
 
     body = to_manifold(vertices, faces)
     good = body.status() == manifold3d.Error.NoError
+    tangled = False
     if good:
         if body.num_tri() > MAX_TRIANGLES:
             body = thinned(body, MAX_TRIANGLES)
             vertices, faces = to_mesh(body)
-        if not _crosses(vertices, faces):
+        # Where bodies share an edge, Manifold pairs its faces blindly: resolve these exactly.
+        tangled = bool(Edges.of(faces).count.max() > 2)
+        if not tangled and not _crosses(vertices, faces):
             return body, False
         if body.num_tri() > CROSSING_LIMIT:
             vertices, faces = to_mesh(thinned(body, CROSSING_LIMIT))
@@ -152,7 +155,7 @@ def _sound(vertices: Points, faces: Faces) -> tuple[manifold3d.Manifold, bool]:
     if clear.status() != manifold3d.Error.NoError or clear.is_empty():
         clear = to_manifold(*wrap(vertices, faces))
     if good and abs(clear.volume() - body.volume()) < SAME_VOLUME * body.volume():
-        return body, False
+        return (clear if tangled else body), False
     return clear, True
 
 
