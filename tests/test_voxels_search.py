@@ -11,7 +11,13 @@ from fabfold.solid.model import Solid
 from fabfold.voxels.features import RIGID_CONTACT, features
 from fabfold.voxels.model import Voxels
 from fabfold.voxels.offsets import CellEnergy
-from fabfold.voxels.placement import Capacity, grid_rotations, judge, rank_translations
+from fabfold.voxels.placement import (
+    Capacity,
+    grid_rotations,
+    judge,
+    nearby_rotations,
+    rank_translations,
+)
 from fabfold.voxels.scan import summed_volume
 from fabfold.voxels.search import voxelize
 from fabfold.voxels.store import save_voxels
@@ -251,6 +257,16 @@ def test_rotations_are_proper_seeded_and_include_upright_ones():
     assert np.isclose(rotations[:, 2, 2], 1.0).sum() >= 10
     assert np.array_equal(rotations, grid_rotations(30, 1, vertices))
     assert not np.allclose(rotations[2:], grid_rotations(30, 2, vertices)[2:])
+
+
+def test_nearby_rotations_are_small_turns():
+    given = grid_rotations(5, 1, torus().vertices)
+    turned = nearby_rotations(given, 12, 1, 4.0)
+    assert np.allclose(turned @ turned.transpose(0, 2, 1), np.eye(3))
+    for index, rotation in enumerate(turned):
+        cosine = (np.trace(rotation @ given[index % 5].T) - 1) / 2
+        assert 0 < np.degrees(np.arccos(np.clip(cosine, -1, 1))) < 25
+    assert np.array_equal(turned, nearby_rotations(given, 12, 1, 4.0))
 
 
 def test_judge_drops_crumbs_islands_and_surplus_colour():

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from fabfold.voxels.offsets import CellEnergy
 from fabfold.voxels.scan import _box_counts
 
-__all__ = ["MEND_BELOW", "Capacity", "Verdict", "grid_rotations", "judge", "rank_translations"]
+__all__ = [
+    "MEND_BELOW",
+    "Capacity",
+    "Verdict",
+    "grid_rotations",
+    "judge",
+    "nearby_rotations",
+    "rank_translations",
+]
 
 #: Cells with less material than this may be dropped where a template has no room for their colour.
 MEND_BELOW = 0.15
@@ -58,6 +66,17 @@ class Verdict:
     fills: NDArray[np.float64] = field(repr=False, compare=False)
 
 
+def _from_quaternion(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+    w, x, y, z = (quaternion / np.linalg.norm(quaternion)).tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
 def grid_rotations(count: int, seed: int, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rotations of the model against the grid.
 
@@ -77,6 +96,8 @@ def grid_rotations(count: int, seed: int, vertices: NDArray[np.float64]) -> NDAr
     """
     rng = np.random.default_rng([seed, 3])
     spread = vertices - vertices.mean(axis=0)
+    spread /= max(float(np.abs(spread).max()), 1e-300)
+    # einsum, since a matrix product may sum in an order that depends on the number of threads.
     axes = np.linalg.eigh(np.einsum("ij,ik->jk", spread, spread))[1].T[::-1]
     # eigh leaves the signs open: largest entry of each axis positive, and right-handed.
     axes = axes * np.sign(np.take_along_axis(axes, np.abs(axes).argmax(1)[:, None], 1))
@@ -84,22 +105,37 @@ def grid_rotations(count: int, seed: int, vertices: NDArray[np.float64]) -> NDAr
     rotations = [np.eye(3), axes]
     for index in range(max(0, count - 2)):
         if index % 3 == 0:
-            angle = rng.uniform(0.0, math.pi / 2)
-            cosine, sine = math.cos(angle), math.sin(angle)
-            rotations.append(np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]))
+            half = rng.uniform(0.0, math.pi / 4)
+            rotations.append(_from_quaternion(np.array([math.cos(half), 0, 0, math.sin(half)])))
         else:
-            quaternion = rng.normal(size=4)
-            w, x, y, z = (quaternion / np.linalg.norm(quaternion)).tolist()
-            rotations.append(
-                np.array(
-                    [
-                        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-                    ]
-                )
-            )
+            rotations.append(_from_quaternion(rng.normal(size=4)))
     return np.array(rotations[:count])
+
+
+def nearby_rotations(
+    rotations: NDArray[np.float64], count: int, seed: int, spread_deg: float
+) -> NDArray[np.float64]:
+    """Small seeded turns of given rotations, each in its turn.
+
+    Parameters
+    ----------
+    rotations : (r, 3, 3) float64 array
+    count : int
+    seed : int
+    spread_deg : float
+        Standard deviation of the turn about each axis.
+
+    Returns
+    -------
+    (count, 3, 3) float64 array
+    """
+    rng = np.random.default_rng([seed, 4])
+    found = []
+    for index in range(count):
+        half = np.radians(rng.normal(size=3) * spread_deg) / 2
+        small = _from_quaternion(np.concatenate([[1.0], half]))
+        found.append(small @ rotations[index % len(rotations)])
+    return np.array(found).reshape(-1, 3, 3)
 
 
 @njit(cache=True)

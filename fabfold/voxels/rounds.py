@@ -18,7 +18,7 @@ from fabfold.solid.model import Solid
 from fabfold.voxels.cut import Placement
 from fabfold.voxels.model import SUBDIVISION
 from fabfold.voxels.offsets import CellEnergy, Offsets, optimise_offsets
-from fabfold.voxels.placement import Capacity, Verdict, judge, rank_translations
+from fabfold.voxels.placement import Capacity, Verdict, judge, nearby_rotations, rank_translations
 from fabfold.voxels.scan import box_counts, summed_volume
 
 __all__ = ["Ranked", "Rounds", "Tried"]
@@ -34,6 +34,9 @@ PITCHES = (17, 18, 19, 20, 21)
 NEARBY = (0.962, 0.975, 0.9875, 1.0125, 1.025)
 #: Taken off the score for a cell too many once the planes are moved: more than a full cell brings.
 _EXCESS_COST = 2.0
+#: Rotations of which small turns are tried, and how small these are.
+_CENTRES = 10
+_SPREAD_DEG = 4.0
 #: Translations along each axis.
 _STEPS = 4
 #: Pitches added at most because they divide a side of the model evenly.
@@ -113,6 +116,8 @@ class Rounds:
         self.template = template
         self.capacity = Capacity(len(template), template.colours)
         self.rotations = rotations
+        #: The rotation that each one is a small turn of; the given ones are their own.
+        self.family = list(range(len(rotations)))
         self.energy = energy
         self.limit = limit
 
@@ -170,11 +175,29 @@ class Rounds:
                 found.append(best)
         return (float(np.median(found)) if found else None), nearest[1]
 
-    def first(self, pitches: NDArray[np.float64], progress: Progress) -> list[Ranked]:
-        """Rank placements on coarse scans: the best two of each rotation, best first."""
+    def first(
+        self, pitches: NDArray[np.float64], nearby: int, seed: int, progress: Progress
+    ) -> list[Ranked]:
+        """Rank placements on coarse scans: the best two of each rotation, best first.
+
+        Parameters
+        ----------
+        pitches : (p,) float64 array
+        nearby : int
+            Small turns of the best rotations to go on with; they are added to `rotations`.
+        seed : int
+        progress : Progress
+        """
         ranked: list[Ranked] = []
-        count = len(self.rotations)
+        given = len(self.rotations)
+        count = given + nearby
         for index in range(count):
+            if index == given:
+                ranked.sort(key=lambda item: -item.score)
+                best = list(dict.fromkeys(item.rotation for item in ranked))[:_CENTRES]
+                turned = nearby_rotations(self.rotations[best], nearby, seed, _SPREAD_DEG)
+                self.rotations = np.concatenate([self.rotations, turned])
+                self.family.extend(best[turn % len(best)] for turn in range(nearby))
             mine = self._ranked(index, pitches)
             for pitch in self._fitted(index, pitches):
                 mine.extend(self._ranked(index, np.array([pitch])))

@@ -19,6 +19,8 @@ __all__ = ["MAX_LOSS", "voxelize"]
 
 #: A voxelization that loses more than this share of the model's volume is no solution.
 MAX_LOSS = 0.10
+#: Share of the rotations that are small turns of the best of the others.
+_NEARBY = 0.5
 #: Placements of the second round that are refined in the third.
 _REFINED = 6
 #: Pitches to go on with, in twentieths of the ranked ones, where none of the second round fits.
@@ -37,8 +39,8 @@ def voxelize(
     rotation: ArrayLike | None = None,
     origin: ArrayLike | None = None,
     pitch: float | None = None,
-    placements: int = 200,
-    shortlist: int = 40,
+    placements: int = 300,
+    shortlist: int = 64,
     results: int = 8,
     drop_below: float = 0.04,
     max_offset: int = 4,
@@ -61,7 +63,7 @@ def voxelize(
     pitch : float, optional
         Side of a voxel in model units. With all three given, the grid is used as it is.
     placements : int
-        Rotations to try.
+        Rotations to try; half of them are small turns of the best of the other half.
     shortlist : int
         Placements whose planes are moved.
     results : int
@@ -95,12 +97,14 @@ def voxelize(
     progress = progress or SilentProgress()
     _check_numbers(placements, shortlist, results, drop_below, max_offset, max_loss, pitch)
     centre = None if origin is None else _checked_origin(origin)
+    nearby = 0
     if rotation is not None:
         rotations = _checked_rotation(rotation)[None]
     elif centre is not None:
         rotations = np.eye(3)[None]
     else:
-        rotations = grid_rotations(placements, seed, np.asarray(solid.vertices))
+        nearby = int(_NEARBY * placements)
+        rotations = grid_rotations(placements - nearby, seed, np.asarray(solid.vertices))
     rounds = Rounds(solid, template, rotations, CellEnergy(drop_below=drop_below), max_offset)
     if not rounds.volume > 0:
         raise NoVoxelsError("the model encloses no volume; repair it first")
@@ -108,7 +112,7 @@ def voxelize(
 
     pitches = np.array([pitch]) if pitch is not None else _pitches(rounds, max_loss, centre)
     if centre is None:
-        ranked = rounds.first(pitches, progress)[:shortlist]
+        ranked = rounds.first(pitches, nearby, seed, progress)[:shortlist]
     else:
         x, y, z = centre.tolist()
         ranked = [Ranked(0.0, 0, float(value), (x, y, z)) for value in pitches]
@@ -233,7 +237,7 @@ def _shortlist(rounds: Rounds, found: list[Tried], count: int) -> list[Tried]:
 
     def is_new(tried: Tried) -> bool:
         fills = tried.verdict.fills
-        return used.get(tried.rotation, 0) < 2 and all(
+        return used.get(rounds.family[tried.rotation], 0) < 2 and all(
             len(fills) != len(other.verdict.fills)
             or np.abs(fills - other.verdict.fills).mean() >= _SAME_FILL
             for other in chosen
@@ -247,7 +251,8 @@ def _shortlist(rounds: Rounds, found: list[Tried], count: int) -> list[Tried]:
         if not pick:
             break
         chosen.append(pick[0])
-        used[pick[0].rotation] = used.get(pick[0].rotation, 0) + 1
+        family = rounds.family[pick[0].rotation]
+        used[family] = used.get(family, 0) + 1
     return chosen
 
 
