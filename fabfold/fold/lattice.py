@@ -24,7 +24,7 @@ from fabfold.tree.system import HingeSystem
 __all__ = ["REPULSION", "Plan", "closure", "find_path", "free_moves", "refined"]
 
 #: Weight of the repulsion between bodies against one step, see :func:`fabfold.fold.planner.plan`.
-REPULSION = 0.05
+REPULSION = 0.02
 
 
 class Plan(NamedTuple):

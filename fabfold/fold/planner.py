@@ -2,8 +2,8 @@
 
 Two searches grow one hinge step at a time, one from A and one from B. Each wants to come close to
 the best state of the other: its key is the number of steps in which the two states differ, plus a
-small repulsion between the bodies (the sum of 1/r over pairs of bodies), so that of two states
-equally far along the more open one goes first (the paper opens both shapes by such a force).
+small repulsion (the sum of 1/r over pairs of bodies, between their middle cells), so that of two
+states equally far along the more open one goes first (the paper opens both shapes by such a force).
 When a side has made no progress for a while the other side takes over, aiming at the best state
 found; so the distance between the two best states never grows. It is the number of *levels* that
 are still unresolved, and the path is found when it is 0.
@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, pose_scene
 from fabfold.fold.sweep import SweepTable
-from fabfold.fold.turns import turn_is_free
-from fabfold.lattice import ROTATIONS
+from fabfold.fold.turns import Work, obstacles, workspace, world_turn
 
 __all__ = ["Front", "plan"]
 
@@ -193,58 +192,63 @@ def _retarget(front: Front, target: NDArray[np.int8]) -> None:
 
 
 @njit(cache=True)
-def _centres(
-    mech: Mechanism, at: Scene, local: NDArray[np.float64], out: NDArray[np.float64]
-) -> None:
-    for b in range(len(local)):
-        r = at.rotation[b]
-        for i in range(3):
-            out[b, i] = at.shift[b, i] + (
-                ROTATIONS[r, i, 0] * local[b, 0]
-                + ROTATIONS[r, i, 1] * local[b, 1]
-                + ROTATIONS[r, i, 2] * local[b, 2]
-            )
-
-
-@njit(cache=True)
-def _inverse_distance(a: NDArray[np.float64], x: float, y: float, z: float) -> float:
-    return 1.0 / np.sqrt(0.25 + (a[0] - x) ** 2 + (a[1] - y) ** 2 + (a[2] - z) ** 2)
+def _middles(mech: Mechanism) -> NDArray[np.int32]:
+    """The cell of each body nearest to the middle of its cells; -1 for a body without cells."""
+    bodies = len(mech.up) + 1
+    out = np.full(bodies, -1, np.int32)
+    for b in range(bodies):
+        count = mech.first[b + 1] - mech.first[b]
+        least = np.int64(1) << 62
+        for v in range(mech.first[b], mech.first[b + 1]):
+            far = np.int64(0)
+            for i in range(3):
+                total = np.int64(0)
+                for w in range(mech.first[b], mech.first[b + 1]):
+                    total += mech.cell[w, i]
+                far += (np.int64(count) * mech.cell[v, i] - total) ** 2
+            if far < least:
+                least = far
+                out[b] = v
+    return out
 
 
 @njit(cache=True)
 def _force_change(
-    mech: Mechanism, at: Scene, centre: NDArray[np.float64], k: int, way: int
+    mech: Mechanism,
+    at: Scene,
+    middle: NDArray[np.int32],
+    inverse: NDArray[np.float64],
+    k: int,
+    way: int,
+    work: Work,
 ) -> float:
     """Change of the sum of 1/r over pairs of bodies when hinge `k` makes a step."""
-    b = mech.up[k]
-    r = at.rotation[b]
-    axis = 0
-    sense = way * mech.sign[k]
-    p = np.empty(3)
-    for i in range(3):
-        p[i] = at.shift[b, i] + 0.5 * (
-            ROTATIONS[r, i, 0] * mech.pivot[k, 0]
-            + ROTATIONS[r, i, 1] * mech.pivot[k, 1]
-            + ROTATIONS[r, i, 2] * mech.pivot[k, 2]
-        )
-        if ROTATIONS[r, i, mech.axis[k]] != 0:
-            axis = i
-            sense *= ROTATIONS[r, i, mech.axis[k]]
+    pivot = work.pivot
+    axis, sense = world_turn(mech, at, k, way, pivot)
     u = (axis + 1) % 3
     v = (axis + 2) % 3
-    moved = np.empty(3)
+    if sense < 0:
+        u, v = v, u
+    plus = (pivot[u] + pivot[v]) >> 1
+    minus = (pivot[v] - pivot[u]) >> 1
+    end = mech.end[k]
     total = 0.0
-    for i in range(k + 1, mech.end[k]):
-        if mech.first[i] == mech.first[i + 1]:
+    for i in range(k + 1, end):
+        c = middle[i]
+        if c < 0:
             continue
-        moved[axis] = centre[i, axis]
-        moved[u] = p[u] - sense * (centre[i, v] - p[v])
-        moved[v] = p[v] + sense * (centre[i, u] - p[u])
-        for j in range(len(centre)):
-            if k < j < mech.end[k] or mech.first[j] == mech.first[j + 1]:
+        xw, xu, xv = at.world[c, axis], at.world[c, u], at.world[c, v]
+        # A quarter turn: u goes to v, v to -u.
+        yu = plus - xv
+        yv = minus + xu
+        for j in range(len(middle)):
+            d = middle[j]
+            if d < 0 or k < j < end:
                 continue
-            total += _inverse_distance(centre[j], moved[0], moved[1], moved[2])
-            total -= _inverse_distance(centre[j], centre[i, 0], centre[i, 1], centre[i, 2])
+            dw = (at.world[d, axis] - xw) ** 2
+            du, dv = at.world[d, u], at.world[d, v]
+            total += inverse[dw + (du - yu) ** 2 + (dv - yv) ** 2]
+            total -= inverse[dw + (du - xu) ** 2 + (dv - xv) ** 2]
     return total
 
 
@@ -283,8 +287,9 @@ def _expand(
     other: Front,
     target: NDArray[np.int8],
     weight: float,
-    local: NDArray[np.float64],
-    centre: NDArray[np.float64],
+    middle: NDArray[np.int32],
+    inverse: NDArray[np.float64],
+    work: Work,
 ) -> int:
     """Expand the best node of a front; returns a node that the other front has too, or -1."""
     hinges = len(mech.up)
@@ -292,7 +297,6 @@ def _expand(
     front.tally[2] += 1
     q = front.state[node].copy()
     pose_scene(mech, at, q)
-    _centres(mech, at, local, centre)
     met = -1
     for k in range(hinges):
         for way in (1, -1):
@@ -301,7 +305,7 @@ def _expand(
                 continue
             q[k] = step
             slot = _slot(front, q)
-            if front.slots[slot] < 0 and turn_is_free(mech, at, table, k, way):
+            if front.slots[slot] < 0 and obstacles(mech, at, table, k, way, work) == 0:
                 new = front.tally[0]
                 front.tally[0] += 1
                 front.slots[slot] = new
@@ -311,7 +315,9 @@ def _expand(
                 front.move[new, 1] = way
                 front.force[new] = front.force[node]
                 if weight > 0:
-                    front.force[new] += weight * _force_change(mech, at, centre, k, way)
+                    front.force[new] += weight * _force_change(
+                        mech, at, middle, inverse, k, way, work
+                    )
                 far = _distance(q, target)
                 front.key[new] = far + front.force[new]
                 _push(front, new)
@@ -369,15 +375,12 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
     if total == 0:
         return 0, 0, empty
 
-    local = np.zeros((hinges + 1, 3), np.float64)
-    for b in range(hinges + 1):
-        for v in range(mech.first[b], mech.first[b + 1]):
-            for i in range(3):
-                local[b, i] += mech.cell[v, i] / (mech.first[b + 1] - mech.first[b])
-    centre = np.zeros((hinges + 1, 3), np.float64)
-
-    mine = _front(hinges, 512)
-    other = _front(hinges, 512)
+    middle = _middles(mech)
+    # Softened, so that bodies whose middles coincide do not count for everything.
+    inverse = 1.0 / np.sqrt(0.25 + np.arange(12 * mech.reach * mech.reach + 1))
+    work = workspace(0)
+    mine = _front(hinges, 1024)
+    other = _front(hinges, 1024)
     _start(mine, start, finish)
     _start(other, finish, start)
     forward = True
@@ -407,7 +410,7 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
             continue
         while mine.tally[0] + 2 * hinges > len(mine.state):
             mine = _grown(mine)
-        met = _expand(mech, at, table, mine, other, target, weight, local, centre)
+        met = _expand(mech, at, table, mine, other, target, weight, middle, inverse, work)
         used += 1
         idle += 1
         far = _distance(mine.state[mine.tally[3]], target)

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -12,11 +14,32 @@ from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, edge_slot, pos
 from fabfold.fold.sweep import SweepTable
 from fabfold.lattice import ROTATIONS
 
-__all__ = ["count_stuck", "obstacles", "turn_is_free"]
+__all__ = ["Work", "count_stuck", "obstacles", "turn_is_free", "workspace", "world_turn"]
+
+
+class Work(NamedTuple):
+    """Room for :func:`obstacles`, made once.
+
+    Attributes
+    ----------
+    pivot, middle : (3,) int64 arrays
+    found : (m, 2) int32 array
+        Pairs (moving body, body in its way), with repetitions.
+    """
+
+    pivot: NDArray[np.int64]
+    middle: NDArray[np.int64]
+    found: NDArray[np.int32]
 
 
 @njit(cache=True)
-def _world_turn(
+def workspace(room: int) -> Work:
+    """Room for `room` pairs; with none, :func:`obstacles` stops at the first one."""
+    return Work(np.empty(3, np.int64), np.empty(3, np.int64), np.empty((room, 2), np.int32))
+
+
+@njit(cache=True)
+def world_turn(
     mech: Mechanism, at: Scene, k: int, way: int, pivot: NDArray[np.int64]
 ) -> tuple[int, int]:
     """World axis and sense of a step of hinge `k`; `pivot` gets twice its point."""
@@ -44,7 +67,7 @@ def obstacles(  # noqa: PLR0912 - one pass, kept whole for speed
     table: SweepTable,
     k: int,
     way: int,
-    found: NDArray[np.int32],
+    work: Work,
 ) -> int:
     """What hinders hinge `k` in its next step forward (`way` 1) or back (-1).
 
@@ -54,16 +77,16 @@ def obstacles(  # noqa: PLR0912 - one pass, kept whole for speed
         The mechanism and its scene, posed.
     table
         Sweeps up to the reach of the mechanism, see :func:`fabfold.fold.sweep.sweep_table`.
-    found : (m, 2) int32 array
-        Gets pairs (moving body, body in its way), with repetitions.
+    work
+        Its `found` gets the pairs.
 
     Returns
     -------
     int
         Number of pairs; counting stops when `found` is full, and at one if it has no room.
     """
-    pivot = np.empty(3, np.int64)
-    axis, sense = _world_turn(mech, at, k, way, pivot)
+    pivot, middle, found = work.pivot, work.middle, work.found
+    axis, sense = world_turn(mech, at, k, way, pivot)
     side = 2 * mech.reach + 1
     stride = (side * side, side, 1)
     u = (axis + 1) % 3
@@ -106,7 +129,6 @@ def obstacles(  # noqa: PLR0912 - one pass, kept whole for speed
                     count += 1
                     if count >= limit:
                         return count
-    middle = np.empty(3, np.int64)
     for e in range(len(at.edge)):
         g = mech.barrel[e, 0]
         if g <= k or g + 1 >= high:
@@ -132,7 +154,7 @@ def obstacles(  # noqa: PLR0912 - one pass, kept whole for speed
 @njit(cache=True)
 def turn_is_free(mech: Mechanism, at: Scene, table: SweepTable, k: int, way: int) -> bool:
     """Whether hinge `k` can make its next step without a collision, ending in a valid state."""
-    return obstacles(mech, at, table, k, way, np.empty((0, 2), np.int32)) == 0
+    return obstacles(mech, at, table, k, way, workspace(0)) == 0
 
 
 @njit(cache=True)
@@ -168,19 +190,19 @@ def count_stuck(  # noqa: PLR0912 - one pass
     for k in range(hinges):
         path[k + 1] = path[mech.up[k]]
         path[k + 1, k // 64] |= one << np.uint64(k % 64)
-    found = np.empty((1024, 2), np.int32)
+    work = workspace(1024)
     masks = np.empty((256, words), np.uint64)
     start = np.zeros(hinges + 1, np.int32)
     seen = np.zeros((hinges + 1, hinges + 1), np.int32)
     used = 0
     for k in range(hinges):
-        count = obstacles(mech, at, table, k, way, found) if mech.steps[k] > 0 else 0
-        while count == len(found):
-            found = np.empty((4 * len(found), 2), np.int32)
-            count = obstacles(mech, at, table, k, way, found)
+        count = obstacles(mech, at, table, k, way, work) if mech.steps[k] > 0 else 0
+        while count == len(work.found):
+            work = workspace(4 * len(work.found))
+            count = obstacles(mech, at, table, k, way, work)
         for i in range(count):
-            a = found[i, 0]
-            b = found[i, 1]
+            a = work.found[i, 0]
+            b = work.found[i, 1]
             if seen[a, b] == k + 1:
                 continue
             seen[a, b] = k + 1
