@@ -19,6 +19,7 @@ SIMPLIFY_MM = 0.001
 #: Side of the cubes that are taken out where a body touches itself in a point or along an edge.
 _NICK_MM = 0.15
 _ROUNDS = 6
+_CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
 def stl_mesh(
@@ -54,10 +55,10 @@ def stl_mesh(
 
 
 def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Vertices at which a mesh is not a closed, oriented two-manifold.
+    """Where a mesh is not a closed, oriented two-manifold.
 
-    A vertex is at fault if one of its edges is not shared by exactly two triangles that run
-    through it in opposite directions, or if its triangles form more than one fan.
+    An edge is at fault if it is not shared by exactly two triangles that run through it in
+    opposite directions, a vertex if its triangles form more than one fan.
 
     Parameters
     ----------
@@ -66,8 +67,9 @@ def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDAr
 
     Returns
     -------
-    (k,) int64 array
-        Sorted vertex indices; empty for a sound mesh.
+    (k, 2) int64 array
+        The two vertices of each faulty edge; twice the same for a faulty vertex. Empty for a
+        sound mesh.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -79,7 +81,8 @@ def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDAr
     keys, times = np.unique(forward, return_counts=True)
     lonely = keys[(times != 1) | ~np.isin(keys, backward)]
     if len(lonely):
-        return np.unique(np.concatenate([lonely // count, lonely % count]))
+        edges = np.sort(np.stack([lonely // count, lonely % count], axis=1), axis=1)
+        return np.asarray(np.unique(edges, axis=0), dtype=np.int64)
     # Corners of one vertex hang together across the edges that leave it: one component a fan.
     order = np.argsort(backward)
     position = np.searchsorted(backward[order], forward)
@@ -93,7 +96,8 @@ def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDAr
     _, fan = connected_components(links, directed=False)
     pairs = np.unique(np.stack([start, fan.astype(np.int64)], axis=1), axis=0)
     vertex, fans = np.unique(pairs[:, 0], return_counts=True)
-    return np.asarray(vertex[fans > 1], dtype=np.int64)
+    split = vertex[fans > 1].astype(np.int64)
+    return np.stack([split, split], axis=1)
 
 
 def piece_count(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> int:
@@ -151,10 +155,11 @@ def finish_mesh(
             if pieces != 1:
                 raise GeometryError(f"{name}: falls into {pieces} pieces when it is written")
             return vertices, faces
-        side = _NICK_MM * (1.0 + 0.5 * attempt)
+        half = _NICK_MM * (1.0 + 0.5 * attempt) / 2.0
+        ends = vertices[faults] - origin_mm
         nicks = [
-            manifold3d.Manifold.cube((side, side, side), True).translate(tuple(point))
-            for point in vertices[faults] - origin_mm
+            manifold3d.Manifold.hull_points((end[:, None] + half * _CUBE).reshape(-1, 3))
+            for end in ends
         ]
         parts = manifold3d.Manifold.batch_boolean(
             [current, *nicks], manifold3d.OpType.Subtract
