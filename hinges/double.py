@@ -241,7 +241,8 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
         Parameters
         ----------
         parent, child : Part or Solid
-            The bodies in the drawn pose, at least half the gap away from their shared face.
+            The bodies in the drawn pose. Each keeps at least half the gap inside its box: away
+            from the face that they share, and from the faces that they fold together on.
         at : Location or Plane, optional
             Where the hinge's frame lies.
 

@@ -202,7 +202,16 @@ def half_of(plan: HalfPlan, segments: int) -> tuple[Manifold, Manifold]:
     half = (united(plan.web, False) - carve) + united(plan.add, False)
     if plan.bore:
         half -= united(plan.bore, True)
-    return half, carve
+    return _without_slivers(half), carve
+
+
+def _without_slivers(solid: Manifold) -> Manifold:
+    """Drop flat leftovers of planes that differ by rounding only."""
+    from manifold3d import Manifold
+
+    parts = solid.decompose()
+    kept = [part for part in parts if abs(part.volume()) > 1e-6]
+    return solid if len(kept) == len(parts) else Manifold.compose(kept)
 
 
 def part_of(solid: Manifold) -> MeshPart:

@@ -15,7 +15,7 @@ from typing import Literal
 from .clearance import Clearance
 from .errors import HingeError
 from .fit import at_least
-from .shapes import Point, Prism, Shape, Turned, regular, teardrop
+from .shapes import Point, Prism, Shape, Turned, cylinder, regular, teardrop
 from .train import Span, Train
 
 __all__ = ["ConePin", "Pin", "Ring", "Roof", "StraightPin"]
@@ -392,6 +392,19 @@ class StraightPin(Pin):
             for span in train.spans
             if span.owner != train.holder
             for roof_shape in roof.over(radius, span)
+        )
+
+    def access(self, train: Train, edge: float) -> tuple[Shape, ...]:
+        """Clear the bodies before the flat end of a head."""
+        del edge
+        wide = self.radius + self._head(train.clearance) + _SLOPE * train.clearance.radial
+        room = train.clearance.axial
+        ends = (
+            (train.spans[0], train.start - room, train.start),
+            (train.spans[-1], train.end, train.end + room),
+        )
+        return tuple(
+            cylinder(wide, low, high) for span, low, high in ends if span.owner != train.holder
         )
 
     def rings(self, train: Train) -> tuple[Ring, ...]:

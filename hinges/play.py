@@ -210,8 +210,6 @@ def _axes(plan: DoublePlan) -> list[SinglePlan]:
 
 
 def _single(plan: SinglePlan, angle: float) -> Play:
-    from scipy.optimize import linprog
-
     points, normals, gaps = contacts(plan, angle)
     shifts = []
     for direction in np.arange(0.0, 2.0 * pi, _STEP):
@@ -223,15 +221,44 @@ def _single(plan: SinglePlan, angle: float) -> Play:
         closing = direction * normals[:, 2]
         binding = closing > 1e-9
         along.append(float(np.min(gaps[binding] / closing[binding])))
-    rocking = np.cross(points, normals)
-    rows = np.concatenate([normals, rocking[:, :2]], axis=1)
-    tilts = []
-    for direction in np.arange(0.0, 2.0 * pi, 4.0 * _STEP):
-        aim = np.array([0.0, 0.0, 0.0, -np.cos(direction), -np.sin(direction)])
-        across = np.array([[0.0, 0.0, 0.0, -np.sin(direction), np.cos(direction)]])
-        best = linprog(
-            aim, A_ub=rows, b_ub=gaps, A_eq=across, b_eq=[0.0], bounds=[(None, None)] * 5
-        )
-        if best.status == 0:
-            tilts.append(-float(best.fun))
+    directions = np.arange(0.0, 2.0 * pi, 4.0 * _STEP)
+    tilts = [rock(points, normals, gaps, float(direction))[1] for direction in directions]
     return Play(max(shifts), min(shifts), (along[0], along[1]), degrees(max(tilts)))
+
+
+def rock(
+    points: Floats, normals: Floats, gaps: Floats, direction: float
+) -> tuple[tuple[float, float, float], float]:
+    """Rock the child as far as its contacts allow.
+
+    Parameters
+    ----------
+    points, normals, gaps
+        As :func:`contacts` gives them.
+    direction : float
+        Of the axis that it rocks about, across the hinge's own, in radians from +x.
+
+    Returns
+    -------
+    shift : (x, y, z)
+        Of the child's point at the origin in mm.
+    tilt : float
+        In radians.
+
+    Raises
+    ------
+    HingeError
+        If nothing limits it.
+    """
+    from scipy.optimize import linprog
+
+    about = np.array([np.cos(direction), np.sin(direction), 0.0])
+    turning = np.einsum("ij,ij->i", np.cross(about, points), normals)
+    rows = np.column_stack([normals, turning])
+    best = linprog(
+        [0.0, 0.0, 0.0, -1.0], A_ub=rows, b_ub=gaps, bounds=[(None, None)] * 3 + [(0.0, None)]
+    )
+    if best.status != 0:
+        raise HingeError("nothing limits the rocking of this hinge: its two halves do not meet")
+    x, y, z, tilt = (float(value) for value in best.x)
+    return (x, y, z), tilt

@@ -273,8 +273,8 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
         Parameters
         ----------
         parent, child : Part or Solid
-            The bodies in the drawn pose, at least half the gap away from the faces that they
-            share.
+            The bodies in the drawn pose. Each keeps at least half the gap inside its quadrant:
+            away from the face that they share, and from the one that they fold together on.
         at : Location or Plane, optional
             Where the hinge's frame lies; see :func:`hinge_location`.
 
