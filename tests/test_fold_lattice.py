@@ -8,7 +8,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from fabfold.fold.foldability import LatticeFoldability
+from fabfold.fold.foldability import LatticeFoldability, octants_of
 from fabfold.fold.lattice import closure, find_path, free_moves, refined
 from fabfold.fold.reference import (
     TOUCH,
@@ -88,6 +88,39 @@ def random_system(shape, bodies, seed, quarter=2):
                 hinges.append((a, b, sides[rng.integers(4)], turns))
                 break
     return system_of(cells, [number[owner[c]] for c in cells], hinges)
+
+
+def with_links(system, seed):
+    """The same bodies, but some hinges are double: two edges of the face, a link between them."""
+    rng = np.random.default_rng(seed)
+    names = {0: 0}
+    parent, point2, axis, turns = [], [], [], []
+    for h, p in enumerate(system.parent.tolist()):
+        base = names[p]
+        if rng.random() < 0.5:
+            # The opposite edge of the same face carries the first axis.
+            face = [i for i in range(3) if i != system.axis[h]]
+            face = face[int(rng.integers(2))]
+            other = system.point2[h].copy()
+            other[face] += 2 * (-1 if rng.random() < 0.5 else 1)
+            parent.append(base)
+            point2.append(other)
+            axis.append(system.axis[h])
+            turns.append(int(rng.choice([-2, -1, 1, 2])))
+            base = len(parent)
+        parent.append(base)
+        point2.append(system.point2[h])
+        axis.append(system.axis[h])
+        turns.append(int(system.turns[h]))
+        names[h + 1] = len(parent)
+    return HingeSystem(
+        system.cells,
+        np.array([names[b] for b in system.body.tolist()], dtype=np.int32),
+        np.array(parent, dtype=np.int32),
+        np.array(point2, dtype=np.int32),
+        np.array(axis, dtype=np.int8),
+        np.array(turns, dtype=np.int8),
+    )
 
 
 def brute_force(system):
@@ -174,7 +207,7 @@ def test_a_block_inside_a_ring_cannot_leave():
 @pytest.mark.parametrize(("shape", "quarter"), [((2, 2, 2), 2), ((4, 2, 1), 0)])
 def test_planner_and_closure_agree_with_brute_force(shape, quarter):
     folding = 0
-    for seed in range(40):
+    for seed in range(30):
         system = random_system(shape, 5, seed, quarter)
         goal = system.turns.astype(int)
         want = brute_force(system)
@@ -191,6 +224,19 @@ def test_planner_and_closure_agree_with_brute_force(shape, quarter):
             np.add.at(turned, found.path[:, 0], found.path[:, 1])
             assert (turned == goal).all()
     assert folding >= 3
+
+
+def test_links_without_cells_fold_as_brute_force_says():
+    folding = 0
+    for seed in range(40):
+        system = with_links(random_system((3, 2, 1), 3, seed, 0), seed)
+        want = brute_force(system)
+        path = JUDGE.path(system)
+        assert (path is not None) == want, seed
+        goal = system.turns.astype(int)
+        assert closure(system) == (stuck(system, 0 * goal, 1), stuck(system, goal, -1)), seed
+        folding += want
+    assert folding >= 5
 
 
 def test_larger_random_systems_have_the_closure_of_the_reference():
@@ -228,8 +274,20 @@ def test_missing_eighths_set_a_hinge_free():
     octants[1, 0, 1] = True  # of the flap, what is near the axis
     octants[2, 1, 1] = True  # of the obstacle, what is far from it
     assert closure(refined(system, octants)) == (0, 0)
+    finer = LatticeFoldability(octants=octants)
+    assert finer.stuck(system) == (0, 0)
+    assert finer.path(system).tolist() == [[0, int(system.turns[0])]]
     octants[2, 1, 0] = True
     assert closure(refined(system, octants))[0] == 1
+
+
+def test_octants_hold_any_material():
+    subvoxels = np.zeros((2, 20, 20, 20), dtype=bool)
+    subvoxels[1, 19, 0, 9] = True
+    octants = octants_of(subvoxels)
+    assert np.argwhere(octants).tolist() == [[1, 1, 0, 0]]
+    with pytest.raises(ValueError, match="octants"):
+        LatticeFoldability(octants=octants).stuck(strip(4, [(1, (0, 1, 0))]))
 
 
 def test_answers_do_not_depend_on_the_order_of_voxels_and_survive_pickling():

@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.tree.system import HingeSystem
 
-__all__ = ["LatticeFoldability"]
+__all__ = ["LatticeFoldability", "octants_of"]
+
+
+def octants_of(subvoxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which eighths of each cell hold any material.
+
+    Parameters
+    ----------
+    subvoxels : (n, s, s, s) bool array
+        Material in each cell, s even.
+
+    Returns
+    -------
+    (n, 2, 2, 2) bool array
+    """
+    count, size = subvoxels.shape[:2]
+    half = size // 2
+    parts = subvoxels.reshape(count, 2, half, 2, half, 2, half)
+    return np.asarray(parts.any(axis=(2, 4, 6)))
 
 
 @dataclass(frozen=True)
@@ -23,16 +41,47 @@ class LatticeFoldability:
     patience : int
         Expansions without progress that one side of the search may make at most; a longer look
         is shared between the two sides.
+    octants : (n, 2, 2, 2) bool array, optional
+        Eighths of the voxels' cells in shape A that count as material, for trees that fold only
+        because cells are not full; see :func:`octants_of`. Without it whole cells count. It
+        costs several times as much, and what passes by it is less sure to survive the proof on
+        the bodies.
     """
 
     expansions: int = 2500
     patience: int = 400
+    octants: NDArray[np.bool_] | None = field(default=None, compare=False)
+
+    def _seen(self, system: HingeSystem) -> HingeSystem:
+        from fabfold.fold.lattice import refined
+
+        return system if self.octants is None else refined(system, self.octants)
 
     def stuck(self, system: HingeSystem) -> tuple[int, int]:
         """Hinges that the closure test cannot move, from A and from B."""
         from fabfold.fold.lattice import closure
 
-        return closure(system)
+        return closure(self._seen(system))
+
+    def stuck_hinges(self, system: HingeSystem) -> NDArray[np.bool_]:
+        """Which hinges the closure test cannot move, from A and from B, shape (2, h)."""
+        from fabfold.fold.lattice import stuck_hinges
+
+        return stuck_hinges(system)
+
+    def remaining(self, system: HingeSystem, expansions: int) -> NDArray[np.int32]:
+        """Quarter turns of each hinge that the planner could not resolve, shape (h,).
+
+        Parameters
+        ----------
+        system : HingeSystem
+        expansions : int
+            The planner gives up after this many expansions without progress.
+        """
+        from fabfold.fold.lattice import find_path
+
+        patience = min(expansions, self.patience)
+        return find_path(self._seen(system), self.expansions, patience, short=False).apart
 
     def unresolved(self, system: HingeSystem, expansions: int) -> float:
         """Share of the quarter turns that the planner could not resolve.
@@ -51,7 +100,7 @@ class LatticeFoldability:
         from fabfold.fold.lattice import find_path
 
         patience = min(expansions, self.patience)
-        found = find_path(system, self.expansions, patience, short=False)
+        found = find_path(self._seen(system), self.expansions, patience, short=False)
         return found.levels / found.total if found.total else float(found.levels > 0)
 
     def path(self, system: HingeSystem) -> NDArray[np.int32] | None:
@@ -64,4 +113,4 @@ class LatticeFoldability:
         """
         from fabfold.fold.lattice import find_path
 
-        return find_path(system, self.expansions, self.patience).path
+        return find_path(self._seen(system), self.expansions, self.patience).path

@@ -18,10 +18,18 @@ from fabfold.fold.mechanism import Mechanism, Scene, mechanism, scene
 from fabfold.fold.planner import plan
 from fabfold.fold.shortcut import follow, shorten
 from fabfold.fold.sweep import SweepTable, sweep_table
-from fabfold.fold.turns import count_stuck
+from fabfold.fold.turns import count_stuck, movable_hinges
 from fabfold.tree.system import HingeSystem
 
-__all__ = ["REPULSION", "Plan", "closure", "find_path", "free_moves", "refined"]
+__all__ = [
+    "REPULSION",
+    "Plan",
+    "closure",
+    "find_path",
+    "free_moves",
+    "refined",
+    "stuck_hinges",
+]
 
 #: Weight of the repulsion between bodies against one step, see :func:`fabfold.fold.planner.plan`.
 REPULSION = 0.02
@@ -40,12 +48,15 @@ class Plan(NamedTuple):
         States expanded.
     path : (m, 2) int32 array or None
         Hinge index and signed quarter turns about its positive axis, one row a move.
+    apart : (h,) int32 array
+        Quarter turns of each hinge by which the two ends still differ; they add up to `levels`.
     """
 
     levels: int
     total: int
     expansions: int
     path: NDArray[np.int32] | None
+    apart: NDArray[np.int32]
 
 
 def _ready(system: HingeSystem) -> tuple[Mechanism, Scene, SweepTable]:
@@ -68,6 +79,16 @@ def closure(system: HingeSystem) -> tuple[int, int]:
         int(count_stuck(mech, at, table, start, 1)),
         int(count_stuck(mech, at, table, mech.steps.astype(np.int8), -1)),
     )
+
+
+def stuck_hinges(system: HingeSystem) -> NDArray[np.bool_]:
+    """Which hinges nothing can ever set free, from A (first row) and from B, shape (2, h)."""
+    mech, at, table = _ready(system)
+    stuck = np.zeros((2, len(mech.up)), dtype=bool)
+    start = np.zeros(len(mech.up), dtype=np.int8)
+    stuck[0, mech.origin] = ~movable_hinges(mech, at, table, start, 1)
+    stuck[1, mech.origin] = ~movable_hinges(mech, at, table, mech.steps.astype(np.int8), -1)
+    return stuck
 
 
 def _merged(system: HingeSystem, mech: Mechanism, steps: NDArray[np.int16]) -> NDArray[np.int32]:
@@ -113,12 +134,14 @@ def find_path(
     """
     mech, at, table = _ready(system)
     total = int(mech.steps.sum())
-    levels, used, steps = plan(mech, at, table, expansions, patience, repulsion)
+    levels, used, steps, differ = plan(mech, at, table, expansions, patience, repulsion)
+    apart = np.zeros(len(system.parent), dtype=np.int32)
+    apart[mech.origin] = differ
     if levels > 0:
-        return Plan(int(levels), total, int(used), None)
+        return Plan(int(levels), total, int(used), None, apart)
     if short:
         steps = shorten(mech, at, table, steps)
-    return Plan(0, total, int(used), _merged(system, mech, steps))
+    return Plan(0, total, int(used), _merged(system, mech, steps), apart)
 
 
 def free_moves(system: HingeSystem, path: NDArray[np.integer]) -> int:
@@ -159,8 +182,17 @@ def refined(system: HingeSystem, octants: NDArray[np.bool_]) -> HingeSystem:
     -------
     HingeSystem
         Cell ``x`` becomes the half cells ``2 x`` and ``2 x + 1``; lengths double.
+
+    Raises
+    ------
+    ValueError
+        If `octants` has not one entry a voxel.
     """
-    kept = np.argwhere(np.asarray(octants, dtype=bool).reshape(-1, 2, 2, 2))
+    if np.shape(octants) != (len(system.cells), 2, 2, 2):
+        raise ValueError(
+            f"octants: wants shape ({len(system.cells)}, 2, 2, 2), found {np.shape(octants)}"
+        )
+    kept = np.argwhere(np.asarray(octants, dtype=bool))
     return HingeSystem(
         cells=(2 * np.asarray(system.cells)[kept[:, 0]] + kept[:, 1:]).astype(np.int32),
         body=np.asarray(system.body)[kept[:, 0]].astype(np.int32),

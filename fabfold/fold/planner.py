@@ -338,7 +338,7 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
     limit: int,
     patience: int,
     weight: float,
-) -> tuple[int, int, NDArray[np.int16]]:
+) -> tuple[int, int, NDArray[np.int16], NDArray[np.int8]]:
     """Search a path from A to B.
 
     Parameters
@@ -360,6 +360,8 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
     expansions : int
     path : (m, 2) int16 array
         Hinge of the mechanism and way (+1, -1) of each step; empty unless `levels` is 0.
+    apart : (h,) int8 array
+        Steps of each hinge by which the two best states differ; they add up to `levels`.
     """
     hinges = len(mech.up)
     start = np.zeros(hinges, np.int8)
@@ -371,9 +373,9 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
     good = pose_scene(mech, at, finish) and good
     clear_scene(mech, at)
     if not good:
-        return max(1, total), 0, empty
+        return max(1, total), 0, empty, finish
     if total == 0:
-        return 0, 0, empty
+        return 0, 0, empty, start
 
     middle = _middles(mech)
     # Softened, so that bodies whose middles coincide do not count for everything.
@@ -386,6 +388,7 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
     forward = True
     target = finish.copy()
     levels = total
+    apart = finish.copy()
     stalled = 0
     idle = 0
     used = 0
@@ -405,6 +408,7 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
             far = _distance(mine.state[mine.tally[3]], target)
             if far < levels:
                 levels = far
+                apart = np.abs(mine.state[mine.tally[3]] - target)
                 stalled = 0
             idle = 0
             continue
@@ -416,10 +420,11 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
         far = _distance(mine.state[mine.tally[3]], target)
         if far < levels:
             levels = far
+            apart = np.abs(mine.state[mine.tally[3]] - target)
             idle = 0
             stalled = 0
     if met < 0:
-        return levels, used, empty
+        return levels, used, empty, apart
 
     there = other.slots[_slot(other, mine.state[met])]
     if not forward:
@@ -432,4 +437,4 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
     for i in range(rest):
         path[size + i, 0] = steps[size + rest - 1 - i, 0]
         path[size + i, 1] = -steps[size + rest - 1 - i, 1]
-    return 0, used, path
+    return 0, used, path, start

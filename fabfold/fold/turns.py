@@ -14,7 +14,15 @@ from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, edge_slot, pos
 from fabfold.fold.sweep import SweepTable
 from fabfold.lattice import ROTATIONS
 
-__all__ = ["Work", "count_stuck", "obstacles", "turn_is_free", "workspace", "world_turn"]
+__all__ = [
+    "Work",
+    "count_stuck",
+    "movable_hinges",
+    "obstacles",
+    "turn_is_free",
+    "workspace",
+    "world_turn",
+]
 
 
 class Work(NamedTuple):
@@ -158,10 +166,10 @@ def turn_is_free(mech: Mechanism, at: Scene, table: SweepTable, k: int, way: int
 
 
 @njit(cache=True)
-def count_stuck(  # noqa: PLR0912 - one pass
+def movable_hinges(  # noqa: PLR0912 - one pass
     mech: Mechanism, at: Scene, table: SweepTable, q: NDArray[np.int8], way: int
-) -> int:
-    """Closure test: hinges that nothing can ever set free, starting from state `q`.
+) -> NDArray[np.bool_]:
+    """Closure test: hinges that something may set free, starting from state `q`.
 
     A hinge counts as movable when every pair of bodies that blocks its first turn has an already
     movable hinge on its path in the tree; repeated until nothing changes. A hinge that stays
@@ -176,15 +184,16 @@ def count_stuck(  # noqa: PLR0912 - one pass
 
     Returns
     -------
-    int
-        Hinges that are not movable; all of them if the state itself is not valid.
+    (h,) bool array
+        False for hinges that nothing can ever set free; for all of them if the state itself is
+        not valid.
     """
     hinges = len(mech.up)
     words = (hinges + 63) // 64
     good = pose_scene(mech, at, q)
     if not good:
         clear_scene(mech, at)
-        return hinges
+        return np.zeros(hinges, np.bool_)
     path = np.zeros((hinges + 1, words), np.uint64)
     one = np.uint64(1)
     for k in range(hinges):
@@ -218,7 +227,6 @@ def count_stuck(  # noqa: PLR0912 - one pass
 
     movable = np.zeros(words, np.uint64)
     loose = np.zeros(hinges, np.bool_)
-    left = hinges
     changed = True
     while changed:
         changed = False
@@ -238,6 +246,13 @@ def count_stuck(  # noqa: PLR0912 - one pass
             if free:
                 loose[k] = True
                 movable[k // 64] |= one << np.uint64(k % 64)
-                left -= 1
                 changed = True
-    return left
+    return loose
+
+
+@njit(cache=True)
+def count_stuck(
+    mech: Mechanism, at: Scene, table: SweepTable, q: NDArray[np.int8], way: int
+) -> int:
+    """Number of hinges that :func:`movable_hinges` finds stuck."""
+    return len(mech.up) - int(np.sum(movable_hinges(mech, at, table, q, way)))
