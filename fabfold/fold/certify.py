@@ -18,35 +18,15 @@ from fabfold.errors import CheckError
 from fabfold.fold.bvh import Boxes, empty_boxes, refit
 from fabfold.fold.gap import FAILED, UNPROVEN, least_gap, sweep_pairs
 from fabfold.fold.model import Motion
+from fabfold.fold.motion import end_pose_error
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.model import FoldTree
 
-__all__ = ["certify", "end_pose_error"]
+__all__ = ["certify"]
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 _START = "shape A"
-
-
-def end_pose_error(tree: FoldTree, angles_deg: F64) -> float:
-    """Greatest distance of a voxel's corner from its place in the template, in voxel sides.
-
-    Parameters
-    ----------
-    tree : FoldTree
-    angles_deg : (h,) array
-        Angles at the end of the path.
-    """
-    whole = np.eye(4)
-    whole[:3, :3] = tree.root_rotation
-    whole[:3, 3] = tree.root_translation
-    pose = (whole @ tree.body_poses(angles_deg))[tree.voxel_body]
-    worst = 0.0
-    for corner in np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T:
-        here = np.einsum("nij,nj->ni", pose[:, :3, :3], tree.source + corner) + pose[:, :3, 3]
-        there = tree.target + np.einsum("nij,j->ni", tree.orientation, corner)
-        worst = max(worst, float(np.linalg.norm(here - there, axis=1).max(initial=0.0)))
-    return worst
 
 
 def _carried(tree: FoldTree, hinge: int) -> NDArray[np.bool_]:

@@ -106,6 +106,9 @@ class LatticeFoldability:
     def path(self, system: HingeSystem) -> NDArray[np.int32] | None:
         """Folding path after shortcutting, or None where the planner finds none.
 
+        A short look may meet by luck where a long one, which trades sides later, does not; so
+        shorter patience is tried as well.
+
         Returns
         -------
         (m, 2) int32 array or None
@@ -113,4 +116,9 @@ class LatticeFoldability:
         """
         from fabfold.fold.lattice import find_path
 
-        return find_path(self._seen(system), self.expansions, self.patience).path
+        seen = self._seen(system)
+        for patience in (self.patience, self.patience // 4, self.patience // 10):
+            found = find_path(seen, self.expansions, patience).path
+            if found is not None:
+                return found
+        return None

@@ -1,4 +1,4 @@
-"""A lattice path as keyframes."""
+"""A lattice path as keyframes, and where a path ends."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fabfold.fold.model import Motion
 from fabfold.tree.model import FoldTree
 
-__all__ = ["motion_of"]
+__all__ = ["end_pose_error", "motion_of"]
 
 
 def motion_of(tree: FoldTree, path: NDArray[np.integer]) -> Motion:
@@ -49,3 +49,24 @@ def motion_of(tree: FoldTree, path: NDArray[np.integer]) -> Motion:
         angles_deg=angles,
         moves=((), *((int(hinge),) for hinge in moves[:, 0])),
     )
+
+
+def end_pose_error(tree: FoldTree, angles_deg: NDArray[np.float64]) -> float:
+    """Greatest distance of a voxel's corner from its place in the template, in voxel sides.
+
+    Parameters
+    ----------
+    tree : FoldTree
+    angles_deg : (h,) array
+        Angles at the end of the path.
+    """
+    whole = np.eye(4)
+    whole[:3, :3] = tree.root_rotation
+    whole[:3, 3] = tree.root_translation
+    pose = (whole @ tree.body_poses(angles_deg))[tree.voxel_body]
+    worst = 0.0
+    for corner in np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T:
+        here = np.einsum("nij,nj->ni", pose[:, :3, :3], tree.source + corner) + pose[:, :3, 3]
+        there = tree.target + np.einsum("nij,j->ni", tree.orientation, corner)
+        worst = max(worst, float(np.linalg.norm(here - there, axis=1).max(initial=0.0)))
+    return worst

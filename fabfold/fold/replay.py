@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import CheckError
-from fabfold.fold.certify import end_pose_error
 from fabfold.fold.model import Motion
+from fabfold.fold.motion import end_pose_error
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.model import FoldTree
 
