@@ -67,7 +67,7 @@ class LatticeFoldability:
         """Which hinges the closure test cannot move, from A and from B, shape (2, h)."""
         from fabfold.fold.lattice import stuck_hinges
 
-        return stuck_hinges(system)
+        return stuck_hinges(self._seen(system))
 
     def remaining(self, system: HingeSystem, expansions: int) -> NDArray[np.int32]:
         """Quarter turns of each hinge that the planner could not resolve, shape (h,).

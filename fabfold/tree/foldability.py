@@ -28,6 +28,30 @@ class Foldability(Protocol):
             Hinges not movable from shape A, and from shape B.
         """
 
+    def stuck_hinges(self, system: HingeSystem) -> NDArray[np.bool_]:
+        """Which hinges the closure test cannot move: where to change the tree.
+
+        Returns
+        -------
+        (2, h) bool array
+            From shape A and from shape B.
+        """
+
+    def remaining(self, system: HingeSystem, expansions: int) -> NDArray[np.int32]:
+        """Quarter turns of each hinge that the planner could not find.
+
+        Parameters
+        ----------
+        system : HingeSystem
+        expansions : int
+            The planner gives up after this many expansions without progress.
+
+        Returns
+        -------
+        (h,) int32 array
+            All zero when it folds.
+        """
+
     def unresolved(self, system: HingeSystem, expansions: int) -> float:
         """Share of the path that the planner could not find.
 
