@@ -7,6 +7,7 @@ from typing import Any
 
 from fabfold import __version__
 from fabfold.attempt import Attempt, Made
+from fabfold.export.colours import body_colours
 from fabfold.export.glb import write_glb
 from fabfold.export.picture import write_strip
 from fabfold.export.report import write_report
@@ -96,6 +97,7 @@ def write_kit(
     """
     tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
     name = recipe.name
+    colours = body_colours(tree)
     write_text(folder / "kit.toml", recipe.to_toml())
     progress.update(0.1, "bodies as STL")
     write_made(folder, made)
@@ -112,13 +114,15 @@ def write_kit(
                 f"profile {profile.name}, seed {recipe.seed}"
             ),
         },
+        colours=colours,
     )
     progress.update(0.3, "STEP")
-    write_step(folder / f"{name}.step", joinery)
+    write_step(folder / f"{name}.step", joinery, tree, title=name, colours=colours)
     progress.update(0.8, "animation")
-    write_glb(folder / "fold.glb", joinery, tree, motion)
+    write_glb(folder / "fold.glb", joinery, tree, motion, title=name, colours=colours)
     progress.update(0.85, "picture")
-    write_strip(folder / "fold.png", joinery, tree, motion)
+    upright = made.attempt.voxels.rotation.T
+    write_strip(folder / "fold.png", joinery, tree, motion, colours=colours, upright=upright)
     progress.update(0.95, "report")
     write_checks(folder, solid, made, checks)
     progress.update(1.0, str(folder))
