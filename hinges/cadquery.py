@@ -19,7 +19,8 @@ method                              what it does at every point of the stack
 ``cutHinge(side, length, ...)``     cuts what one body gives up
 ==================================  ===============================================================
 
-The hinge's axis is the local z of each point, x points from parent to child and y out of the face
+Where the stack holds solids instead of points, the place is the origin of the workplane. The
+hinge's axis is the local z of each point, x points from parent to child and y out of the face
 that they share; see :class:`hinges.SingleHinge` for the other parameters. Shapes pass both ways as
 handles of the one kernel: nothing is copied or written to disk.
 """
@@ -118,12 +119,22 @@ def _half_and_carve(side: str, length: float, options: dict[str, Any]) -> tuple[
     raise HingeError(f"side {side!r}: use 'parent' or 'child'")
 
 
+def _points(self: cq.Workplane) -> cq.Workplane:
+    """Take the stack as points; solids on it stand for the origin of the workplane.
+
+    After ``box()`` the stack holds the body itself, and its centre is no place for a hinge.
+    """
+    if self.objects and all(isinstance(one, cq.Solid | cq.Compound) for one in self.objects):
+        return self.newObject([self.plane.origin])
+    return self
+
+
 def single_hinge(
     self: cq.Workplane, length: float, combine: bool = True, clean: bool = True, **options: Any
 ) -> cq.Workplane:
     """Add both halves of a single hinge at every point of the stack."""
     whole = _whole(_single(length, options))
-    return self.eachpoint(whole.moved, True, combine, clean)
+    return _points(self).eachpoint(whole.moved, True, combine, clean)
 
 
 def double_hinge(
@@ -135,7 +146,7 @@ def double_hinge(
     from .double import DoubleHinge
 
     whole = _whole(DoubleHinge(size, mode=Mode.PRIVATE, **options))
-    return self.eachpoint(whole.moved, True, combine, clean)
+    return _points(self).eachpoint(whole.moved, True, combine, clean)
 
 
 def hinge_half(
@@ -148,7 +159,7 @@ def hinge_half(
 ) -> cq.Workplane:
     """Add one half, "parent" or "child", at every point of the stack."""
     half = to_cadquery(_half_and_carve(side, length, options)[0])
-    return self.eachpoint(half.moved, True, combine, clean)
+    return _points(self).eachpoint(half.moved, True, combine, clean)
 
 
 def cut_hinge(
@@ -157,7 +168,7 @@ def cut_hinge(
     """Cut what a body gives up to a hinge at every point of the stack."""
     pieces = _pieces(_half_and_carve(side, length, options)[1])
     cutter = cq.Compound.makeCompound(pieces)
-    return self.eachpoint(cutter.moved, True, "cut", clean)
+    return _points(self).eachpoint(cutter.moved, True, "cut", clean)
 
 
 def _fitted(self: cq.Workplane, side: str, length: float, options: dict[str, Any]) -> cq.Workplane:
@@ -168,9 +179,9 @@ def _fitted(self: cq.Workplane, side: str, length: float, options: dict[str, Any
     # Each point of the stack, in global coordinates, as a place for the hinge.
     places = [
         location
-        for shape in self.eachpoint(
-            lambda place: cq.Vertex.makeVertex(0, 0, 0).moved(place), True
-        ).vals()
+        for shape in _points(self)
+        .eachpoint(lambda place: cq.Vertex.makeVertex(0, 0, 0).moved(place), True)
+        .vals()
         for location in [shape.location()]
     ]
     for place in places:

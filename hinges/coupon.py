@@ -18,6 +18,7 @@ from __future__ import annotations
 import struct
 import uuid
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -368,6 +369,7 @@ def _write_step(path: Path, pieces: Sequence[Piece], title: str) -> None:
 
     named = []
     for piece, solid in zip(pieces, coupon_solids(pieces), strict=True):
-        solid.label = piece.name
-        named.append(solid)
+        own = deepcopy(solid)  # equal flaps share one shape in memory, and so would share a name
+        own.label = piece.name
+        named.append(own)
     export_step(Compound(label=title, children=named), path, timestamp="2000-01-01T00:00:00")

@@ -9,7 +9,7 @@ model is exact to second order; a test compares it with sampled collisions of th
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import acos, asin, degrees, pi
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import HingeError
-from .plan import SinglePlan, SingleSpec, plan_single
+from .plan import HalfPlan, SinglePlan, SingleSpec, plan_single
 
 if TYPE_CHECKING:
     from .plan_double import DoublePlan
@@ -192,20 +192,28 @@ def play(hinge: object, angle: float | None = None) -> Play:
 def _axes(plan: DoublePlan) -> list[SinglePlan]:
     """Read each axis of a double hinge as a single hinge of the same knuckles."""
     spec = plan.spec
+    like = SingleSpec.read(
+        spec.size,
+        radius=spec.radius,
+        pin=spec.pin,
+        clearance=spec.clearance,
+        leaf=spec.bracket,
+        gap=spec.gap,
+        chamfer=spec.chamfer,
+        margin=spec.margin,
+        wall=spec.wall,
+    )
     made = []
-    for _ in range(2):
-        single = SingleSpec.read(
-            spec.size if not spec.same_edge else 0.5 * spec.size + spec.margin,
-            knuckles=3,
-            radius=spec.radius,
-            pin=spec.pin,
-            clearance=spec.clearance,
-            leaf=spec.bracket,
-            gap=spec.gap,
-            margin=spec.margin,
-            wall=spec.wall,
-        )
-        made.append(plan_single(single.with_(knuckles=3 if spec.same_edge else spec.knuckles)))
+    for axis in (0, 1):
+        train = plan.trains[0 if spec.same_edge else axis]
+        if spec.same_edge:  # link, body, link: the knuckles on either side of one body's
+            block = 2 * axis
+            where = [i for i, span in enumerate(train.spans) if span.owner == block]
+            kept = train.spans[where[0] - 1 : where[-1] + 2]
+            kept = tuple(replace(span, owner=0 if span.owner == block else 1) for span in kept)
+            train = replace(train, spans=kept)
+        none = HalfPlan((), (), ())
+        made.append(SinglePlan(like, train, 0.0, none, none, ()))
     return made
 
 

@@ -218,7 +218,7 @@ class SnapSpec:
     @property
     def _foot(self) -> float:
         """Half the ridge's length along the tongue in mm."""
-        return self.catch / tan(radians(self.lead))
+        return self.catch / tan(radians(self.lead)) + 0.1
 
     def check(self) -> None:
         """Refuse a tongue that would not hold, or break.

@@ -1,0 +1,108 @@
+"""Hinges in CadQuery, and what is said about a broken environment."""
+
+import pytest
+
+from hinges import HingeError, KernelError
+from hinges import kernel as kernel_module
+
+cq = pytest.importorskip("cadquery", reason="CadQuery is not installed in this environment")
+plugin = pytest.importorskip("hinges.cadquery")
+
+
+def body(x):
+    return cq.Workplane().box(19.7, 19.7, 19.7).translate((x, -10, 0))
+
+
+def test_methods_work_at_every_point_of_the_stack():
+    made = cq.Workplane("XZ").pushPoints([(0, 0), (60, 0), (0, 60)]).singleHinge(20, clearance=0.3)
+    assert made.solids().size() == 6
+    made = cq.Workplane().rarray(50, 50, 2, 2).doubleHinge(20, clearance=0.3)
+    assert made.solids().size() == 12
+    apart = cq.Workplane().pushPoints([(0, 0), (60, 0)]).singleHinge(20, combine=False)
+    assert apart.size() == 2
+
+
+def test_bodies_keep_the_clearance():
+    parent = body(-10).hingeParent(20, clearance=0.3)
+    child = body(10).hingeChild(20, clearance=0.3)
+    assert parent.solids().size() == child.solids().size() == 1
+    assert parent.val().isValid()
+    assert parent.val().BoundingBox().xmax == pytest.approx(2.5)  # the barrel, on the axis
+    assert child.val().BoundingBox().ymax == pytest.approx(2.5)
+    assert parent.val().distance(child.val()) == pytest.approx(0.3, abs=1e-6)
+    assert parent.intersect(child).solids().size() == 0
+    for angle in (60, 180):
+        opened = child.rotate((0, 0, 0), (0, 0, 1), angle)
+        assert parent.val().distance(opened.val()) == pytest.approx(0.3, abs=1e-6)
+
+
+def test_two_hinges_on_one_body():
+    long = cq.Workplane().box(19.7, 19.7, 80).translate((-10, -10, 0))
+    both = long.pushPoints([cq.Location((0, 0, -25)), cq.Location((0, 0, 25))])
+    made = both.hingeParent(20, clearance=0.3)
+    assert made.solids().size() == 1
+    one = long.hingeParent(20, clearance=0.3)
+    assert made.val().Volume() != pytest.approx(one.val().Volume())
+
+
+def test_halves_and_cutters():
+    cut = body(-10).cutHinge("parent", 20, clearance=0.3)
+    fitted = cut.hingeHalf("parent", 20, clearance=0.3)
+    direct = body(-10).hingeParent(20, clearance=0.3)
+    assert fitted.val().Volume() == pytest.approx(direct.val().Volume(), rel=1e-9)
+    with pytest.raises(HingeError, match="side"):
+        body(-10).cutHinge("left", 20)
+
+
+def test_plain_functions_for_invoke_and_apply():
+    parent = body(-10).invoke(plugin.parent_of(20, clearance=0.3))
+    child = body(10).invoke(plugin.child_of(20, clearance=0.3))
+    assert parent.val().distance(child.val()) == pytest.approx(0.3, abs=1e-6)
+    made = cq.Workplane().pushPoints([(0, 0), (40, 0)]).apply(plugin.hinge_at(20, clearance=0.3))
+    assert made.solids().size() == 4
+
+
+def test_shapes_pass_both_ways_without_a_copy():
+    from build123d import Box
+
+    part = Box(1, 2, 3)
+    shape = plugin.to_cadquery(part)
+    assert shape.Volume() == pytest.approx(6)
+    assert shape.wrapped.IsSame(part.solid().wrapped)
+    back = plugin.from_cadquery(cq.Workplane(obj=shape))
+    assert back.solid().wrapped.IsSame(shape.wrapped)
+    assert plugin.from_cadquery(shape).volume == pytest.approx(6)
+    with pytest.raises(HingeError, match="no solid"):
+        plugin.from_cadquery(cq.Workplane().rect(1, 1))
+
+
+def test_a_body_out_of_reach_is_refused():
+    with pytest.raises(HingeError, match="pieces instead of 1"):
+        body(200).hingeParent(20)
+
+
+def test_no_name_is_overridden(monkeypatch):
+    import importlib
+
+    def mine(self):
+        return "mine"
+
+    monkeypatch.setattr(cq.Workplane, "singleHinge", mine)
+    importlib.reload(plugin)
+    assert cq.Workplane().singleHinge() == "mine"
+    assert set(plugin.METHODS) >= {"singleHinge", "doubleHinge", "hingeParent", "hingeChild"}
+
+
+def test_an_overwritten_kernel_is_named_with_its_cure(monkeypatch):
+    versions = {"cadquery-ocp": "7.8.1.1", "cadquery-ocp-novtk": "8.0.1"}
+    monkeypatch.setattr(kernel_module, "_version", versions.get)
+    with pytest.raises(KernelError, match="overwritten") as caught:
+        kernel_module.check_kernel()
+    for hint in ("pip install", "build123d==0.10", "cadquery==2.7", "pip uninstall"):
+        assert hint in str(caught.value)
+
+
+def test_a_missing_cadquery_is_named(monkeypatch):
+    monkeypatch.setattr(kernel_module, "find_spec", lambda name: None)
+    with pytest.raises(KernelError, match="CadQuery is not installed"):
+        kernel_module.check_kernel(cadquery=True)
