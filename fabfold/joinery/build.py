@@ -196,8 +196,6 @@ def _body(
     tally: Tally,
 ) -> manifold3d.Manifold:
     """One body as one connected solid, lattice origin at zero."""
-    import manifold3d
-
     body = tree.bodies[index]
     cells = tree.source[list(body.voxels)]
     room = eroded_cells(cells, voxel_mm, size.clearance_mm / 2)
@@ -218,18 +216,15 @@ def _body(
         radius_mm=size.reach_mm,
         trim_mm=size.barrel_radius_mm,
     )
-    whole = manifold3d.Manifold.batch_boolean([material, *halves], manifold3d.OpType.Add)
-    cutting = [(h, tool) for h, tool in tools if (whole ^ tool).volume() > 1e-6]
-    _protect_zones(index, tree, cutting, [h for h, _, _ in own], size, voxel_mm)
-    if cutting:
-        cuts = [tool for _, tool in cutting]
-        lost = material ^ manifold3d.Manifold.batch_boolean(cuts, manifold3d.OpType.Add)
+    _protect_zones(index, tree, tools, [h for h, _, _ in own], size, voxel_mm)
+    in_material = _meeting(tools, material)
+    if in_material:
+        lost, material = material.split(_united(in_material))
         volume = lost.volume()
         if volume > 0.01:
             tally.carved_mm3 += volume
             tally.carved_cells += _cells_of(lost, cells, voxel_mm)
-        material = _less(material, cuts)
-        halves = [_less(half, cuts) for half in halves]
+    halves = [_less(half, _meeting(tools, half)) for half in halves]
 
     def free() -> manifold3d.Manifold:
         return _less(room, [*carves, *(tool for _, tool in tools)])
@@ -237,12 +232,43 @@ def _body(
     return one_piece(body.name, cells, free, material, halves, voxel_mm, tally)
 
 
-def _less(solid: manifold3d.Manifold, tools: list[manifold3d.Manifold]) -> manifold3d.Manifold:
+def _evaluated(solid: manifold3d.Manifold) -> manifold3d.Manifold:
+    """The same solid, worked out now.
+
+    Booleans are lazy; one that is used twice before it is worked out may be worked out twice.
+    """
+    solid.num_tri()
+    return solid
+
+
+def _united(solids: list[manifold3d.Manifold]) -> manifold3d.Manifold:
     import manifold3d
 
+    return _evaluated(manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add))
+
+
+def _less(solid: manifold3d.Manifold, tools: list[manifold3d.Manifold]) -> manifold3d.Manifold:
     if not tools:
-        return solid
-    return manifold3d.Manifold.batch_boolean([solid, *tools], manifold3d.OpType.Subtract)
+        return _evaluated(solid)
+    return _evaluated(_evaluated(solid) - _united(tools))
+
+
+def _meeting(
+    tools: list[tuple[int, manifold3d.Manifold]], solid: manifold3d.Manifold
+) -> list[manifold3d.Manifold]:
+    """The tools that take something off a solid: most pass by where a cell is empty."""
+    low, high = _corners(solid)
+    found = []
+    for _, tool in tools:
+        start, end = _corners(tool)
+        if (start < high).all() and (low < end).all() and (solid ^ tool).volume() > 1e-6:
+            found.append(tool)
+    return found
+
+
+def _corners(solid: manifold3d.Manifold) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    box = np.array(solid.bounding_box())
+    return box[:3], box[3:]
 
 
 def _boxes(
@@ -274,7 +300,7 @@ def _cells_of(solid: manifold3d.Manifold, cells: NDArray[np.int32], voxel_mm: fl
 def _protect_zones(
     index: int,
     tree: FoldTree,
-    cutting: list[tuple[int, manifold3d.Manifold]],
+    tools: list[tuple[int, manifold3d.Manifold]],
     own: list[int],
     size: HingeSize,
     voxel_mm: float,
@@ -282,7 +308,11 @@ def _protect_zones(
     """Refuse a groove that would cut into the knuckles of one of the body's own hinges."""
     for h in own:
         zone = knuckle_zone(tree.hinges[h], size, voxel_mm)
-        for culprit, tool in cutting:
+        low, high = _corners(zone)
+        for culprit, tool in tools:
+            start, end = _corners(tool)
+            if (start >= high).any() or (low >= end).any():
+                continue
             if (zone ^ tool).volume() > _ZONE_LOSS_MM3:
                 raise GeometryError(
                     f"{tree.bodies[index].name}: the barrel of {tree.hinges[culprit].name} passes "

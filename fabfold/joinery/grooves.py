@@ -32,7 +32,7 @@ SAGITTA_MM = 0.02
 #: How far the hull may go beyond a barrel that turns on itself between two placements, in mm.
 _EXCESS_MM = 0.15
 _MAX_STEP_DEG = 6.0
-_SIDES = 32
+_SIDES = 24
 
 Floats = NDArray[np.float64]
 
