@@ -111,7 +111,7 @@ def test_step_holds_every_body_by_name(tmp_path):
     assert written == [tmp_path / "coupon.step"]
     read = import_step(written[0])
     assert len(read.solids()) == 4
-    text = written[0].read_text()
+    text = written[0].read_text("utf-8")
     for name in ("frame", "single 0.30", "link 0.30", "double 0.30"):
         assert f"'{name}'" in text
 

@@ -50,7 +50,7 @@ def shells_apart(one, other):
 
 def test_it_stands_on_its_own():
     for path in HOME.glob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             names = [alias.name for alias in getattr(node, "names", [])]
             names.append(getattr(node, "module", None) or "")
             assert not any(name.split(".")[0] == "fabfold" for name in names), path
