@@ -16,7 +16,7 @@ from fabfold.solid.model import Solid
 if TYPE_CHECKING:
     import build123d
 
-__all__ = ["Sample", "build_sample", "load_sample", "sample", "sample_names"]
+__all__ = ["Sample", "build_sample", "load_sample", "sample", "sample_names", "solid_of"]
 
 
 @dataclass(frozen=True)
@@ -107,15 +107,28 @@ def load_sample(name: str) -> Solid:
     ModelError
         If there is no such sample.
     """
+    return solid_of(build_sample(name), sample(name))
+
+
+def solid_of(part: build123d.Part, known: Sample) -> Solid:
+    """Mesh of a drawn sample.
+
+    Parameters
+    ----------
+    part : build123d.Part
+        What :func:`build_sample` returns.
+    known : Sample
+
+    Returns
+    -------
+    Solid
+    """
     from fabfold.solid.load import solid_from_mesh
     from fabfold.solid.raw import RawMesh
     from fabfold.solid.tessellate import tessellate
 
-    known = sample(name)
-    part = build_sample(name)
     size = part.bounding_box().size
-    vertices, faces = tessellate(part, max(size.X, size.Y, size.Z), chord=0.0005, angle=0.2)
+    vertices, faces = tessellate(part, max(size.X, size.Y, size.Z))
     digest = hashlib.sha256(f"sample:{known.name}:{known.version}".encode()).hexdigest()
-    # The kernel's last digits may differ between processors; a model is no finer than this.
-    solid = solid_from_mesh(known.name, RawMesh(np.round(vertices, 9), faces), digest)
-    return solid
+    # Rounded, since the kernel's last digits mean nothing and may differ between processors.
+    return solid_from_mesh(known.name, RawMesh(np.round(vertices, 9), faces), digest)

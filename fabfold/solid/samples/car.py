@@ -17,14 +17,18 @@ def draw() -> Any:
     """Draw the car: 12 mm a voxel, looking along +x."""
     from build123d import Pos
 
-    parts = [_hull(), _cabin_with_windows()]
-    for part in _wheel():
-        for x in AXLES:
-            parts += both_sides(Pos(x, 0, 0) * part)
-    parts += both_sides(ellipsoid((32.2, 10.4, 17.6), (3.6, 3.6, 3.6)))
-    parts += both_sides(ellipsoid((-33.2, 11, 17.6), (2.6, 2.6, 2.6)))
-    parts += [cylinder_y((x, 0, 9.6), 3.0, 30, 2.5) for x in (33.0, -33.0)]
-    return fuse(parts)
+    wheel = _wheel()
+    wheels = [side for x in AXLES for side in both_sides(Pos(x, 0, 0) * wheel)]
+    lamps = [
+        *both_sides(ellipsoid((32.2, 10.4, 17.6), (3.6, 3.6, 3.6))),
+        *both_sides(ellipsoid((-33.2, 11, 17.6), (2.6, 2.6, 2.6))),
+    ]
+    bumpers = [cylinder_y((x, 0, 9.6), 3.0, 30, 2.5) for x in (33.0, -33.0)]
+    # In groups: the kernel takes half the time of one union of all.
+    whole = fuse([_hull(), _cabin_with_windows()])
+    for group in (wheels, lamps, bumpers):
+        whole = fuse([whole, *group])
+    return whole
 
 
 def _hull() -> Any:
@@ -40,7 +44,7 @@ def _hull() -> Any:
 
 def _cabin(inset: float, round_by: float = 0.0) -> Any:
     """The cabin, a truncated pyramid, smaller by `inset` on all sides."""
-    from build123d import Axis, Pos, Rot, Wedge, fillet
+    from build123d import Pos, Rot, Wedge, fillet
 
     base, top = 48 - 2 * inset, 30 - 2 * inset
     left = (base - top) / 2 - 2
@@ -50,7 +54,9 @@ def _cabin(inset: float, round_by: float = 0.0) -> Any:
     wedge = Wedge(base, height, width, left, side, left + top, side + roof)
     body = Pos(-4, 0, 20.8 + height / 2) * Rot(90, 0, 0) * wedge
     if round_by:
-        rims = body.edges() - body.faces().sort_by(Axis.Z)[0].edges()
+        # A list, in the kernel's order: the difference of two edge sets has none.
+        lowest = body.bounding_box().min.Z
+        rims = [edge for edge in body.edges() if lowest + 1 < edge.center().Z]
         body = fillet(rims, round_by)
     return body
 
@@ -70,7 +76,7 @@ def _cabin_with_windows() -> Any:
     return _cabin(0.0, round_by=3.4).cut(*panes)
 
 
-def _wheel() -> list[Any]:
+def _wheel() -> Any:
     """Arch and wheel of the left side, axle at x = 0."""
     from build123d import Box, Pos
 
@@ -79,4 +85,4 @@ def _wheel() -> list[Any]:
     arch = arch - Pos(0, 12, -5) * Box(50, 20, 20)
     tyre = cylinder_y((0, 13.3, WHEEL_RADIUS), WHEEL_RADIUS, 9.4, 2.0)
     tyre = tyre - cylinder_y((0, 18.6, WHEEL_RADIUS), WHEEL_RADIUS - 3.2, 3.0)
-    return [arch, tyre, ellipsoid((0, 16.4, WHEEL_RADIUS), (3.2, 2.2, 3.2))]
+    return fuse([arch, tyre, ellipsoid((0, 16.4, WHEEL_RADIUS), (3.2, 2.2, 3.2))])

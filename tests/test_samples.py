@@ -1,0 +1,94 @@
+"""The built-in samples: sound solids that stand upright and look the same from both sides."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fabfold.errors import ModelError
+from fabfold.lattice import load_template
+from fabfold.solid.load import load_solid
+from fabfold.solid.model import Solid
+from fabfold.solid.samples import build_sample, sample, sample_names, solid_of
+
+
+@functools.cache
+def drawn(name: str) -> Any:
+    return build_sample(name)
+
+
+@functools.cache
+def loaded(name: str) -> Solid:
+    return solid_of(drawn(name), sample(name))
+
+
+def test_names() -> None:
+    assert {"car", "elephant", "rabbit"} <= set(sample_names())
+    assert sample_names() == sorted(sample_names())
+    with pytest.raises(ModelError, match=r"no sample 'unicorn'.*rabbit"):
+        load_solid("sample:unicorn")
+
+
+def test_templates_of_the_classics() -> None:
+    assert sample("car").template == "box-3x4x4"
+    assert sample("rabbit").template == "box-4x4x4"
+    assert sample("elephant").template == "box-5x5x5"
+
+
+@pytest.mark.parametrize("name", sample_names())
+def test_mesh_is_the_drawn_solid(name: str) -> None:
+    import manifold3d
+
+    part = drawn(name)
+    assert part.is_valid
+    assert len(part.solids()) == 1
+    assert part.label == name
+    result = loaded(name)
+    manifold = result.to_manifold()
+    assert manifold.status() == manifold3d.Error.NoError
+    assert len(manifold.decompose()) == 1
+    assert result.to_trimesh().is_watertight
+    assert result.notes == ()
+    assert result.volume == pytest.approx(part.volume, rel=0.01)
+    box = part.bounding_box()
+    expected = np.array([[box.min.X, box.min.Y, box.min.Z], [box.max.X, box.max.Y, box.max.Z]])
+    assert result.bounds == pytest.approx(expected, abs=0.1)
+
+
+@pytest.mark.parametrize("name", sample_names())
+def test_stands_on_the_ground_and_is_symmetric(name: str) -> None:
+    result = loaded(name)
+    low, high = result.bounds
+    assert abs(low[2]) < 0.6
+    assert low[1] == pytest.approx(-high[1], abs=0.05)
+    mesh = result.to_trimesh()
+    assert abs(mesh.center_mass[1]) < 0.01 * (high[1] - low[1])
+    # The middle of mass stands over the feet.
+    feet = result.vertices[result.vertices[:, 2] < low[2] + 3]
+    assert feet[:, 0].min() < mesh.center_mass[0] < feet[:, 0].max()
+
+
+@pytest.mark.parametrize("name", sample_names())
+def test_is_chunky_enough_for_its_box(name: str) -> None:
+    """Voxels of the size that the box asks for are half full or fuller."""
+    result = loaded(name)
+    cells = len(load_template(sample(name).template))
+    pitch = (result.volume / (0.5 * cells)) ** (1 / 3)
+    longest = np.ptp(result.bounds, axis=0).max()
+    assert 4.5 < longest / pitch < 8.5
+    points = np.random.default_rng(0).uniform(*result.bounds, (20_000, 3))
+    inside = points[result.to_trimesh().contains(points)]
+    middle = result.bounds.mean(axis=0)
+    touched = len(np.unique(np.floor((inside - middle) / pitch + 0.5), axis=0))
+    assert touched < 1.6 * cells
+
+
+def test_same_bytes_every_time() -> None:
+    first, second = loaded("duck"), load_solid("sample:duck")
+    assert first.vertices.tobytes() == second.vertices.tobytes()
+    assert first.faces.tobytes() == second.faces.tobytes()
+    assert first.sha256 == second.sha256
+    assert first.sha256 != loaded("rabbit").sha256
