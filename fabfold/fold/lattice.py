@@ -4,7 +4,8 @@ Every hinge axis is an edge of the lattice, so every state in which all hinges s
 of 90° has its cubes on the lattice. A move turns one hinge by 90°, and whether it collides is
 read from a table of the cells that a turning cube sweeps (:mod:`fabfold.fold.sweep`).
 
-A state is valid when no two cells coincide and no two hinge barrels lie on one lattice edge.
+A state is valid when no two cells coincide and no two hinge barrels lie on one lattice edge, and a
+turn is free when no cell and no barrel that it carries runs into one that stays.
 """
 
 from __future__ import annotations
@@ -61,7 +62,8 @@ class Plan(NamedTuple):
 
 def _ready(system: HingeSystem) -> tuple[Mechanism, Scene, SweepTable]:
     mech = mechanism(system)
-    return mech, scene(mech), sweep_table(2 * mech.reach)
+    halves = len(mech.barrel) != len(mech.up)
+    return mech, scene(mech), sweep_table(mech.span, halves=halves)
 
 
 def closure(system: HingeSystem) -> tuple[int, int]:

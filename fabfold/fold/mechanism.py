@@ -68,6 +68,8 @@ class Mechanism(NamedTuple):
         Which body of the system this is.
     reach : int
         No cell ever comes further than this from the origin of the middle body's frame.
+    span : int
+        No cell or barrel that a hinge moves is ever further than this from the hinge.
     """
 
     cell: I32
@@ -84,6 +86,7 @@ class Mechanism(NamedTuple):
     origin: I32
     body: I32
     reach: int
+    span: int
 
 
 @njit(cache=True)
@@ -201,6 +204,22 @@ def _prepare(  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one st
                 far[k] = np.sqrt(length) + (far[i - 1] if i > 0 else 0.0)
                 reach = max(reach, far[k])
 
+    span = 0.0
+    down = np.zeros(hinges, np.float64)
+    for k in range(hinges - 1, -1, -1):
+        for v in range(first[k + 1], first[k + 2]):
+            length = 0.0
+            for a in range(3):
+                length += (cell[v, a] - 0.5 * pivot[k, a]) ** 2
+            down[k] = max(down[k], np.sqrt(length))
+        for j in range(k + 1, hinges):
+            if up[j] == k + 1:
+                length = 0.0
+                for a in range(3):
+                    length += (0.5 * (pivot[k, a] - pivot[j, a])) ** 2
+                down[k] = max(down[k], np.sqrt(length) + down[j])
+        span = max(span, down[k])
+
     # A hinge covers one lattice edge, or two halves of one on a finer lattice.
     edges = 0
     for k in range(hinges):
@@ -219,7 +238,7 @@ def _prepare(  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one st
     bodies_of = order
     return (
         cell, first, up, end, ax, pivot, sign, steps, rotation, shift, barrel, origin,
-        bodies_of, int(np.ceil(reach)) + 3,
+        bodies_of, int(np.ceil(reach)) + 3, int(np.ceil(span)) + 2,
     )  # fmt: skip
 
 

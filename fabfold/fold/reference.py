@@ -10,10 +10,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.fold.barrels import INSET, LEAST, segment_distance
 from fabfold.lattice import rotation_about
 from fabfold.tree.system import HingeSystem
 
-__all__ = ["path_overlap", "poses", "state_is_valid", "stuck", "subtree", "turn_overlap"]
+__all__ = [
+    "barrel_meetings",
+    "path_overlap",
+    "poses",
+    "state_is_valid",
+    "stuck",
+    "subtree",
+    "turn_overlap",
+]
 
 #: Overlaps below this, in voxel sides, are faces that touch.
 TOUCH = 1e-9
@@ -137,12 +146,15 @@ def path_overlap(
 ) -> list[float]:
     """Greatest overlap in each move of a path from A, voxel sides; see :func:`turn_overlap`.
 
-    A move that passes through a state that is not valid counts as infinite.
+    A move that passes through a state that is not valid, or on which barrels meet, counts as
+    infinite.
     """
     q = np.zeros(len(system.parent), dtype=int)
     found = []
     for hinge, turn in np.asarray(path, dtype=int).reshape(-1, 2).tolist():
         deep = float(turn_overlap(system, q, hinge, turn, step_deg).max(initial=-np.inf))
+        if barrel_meetings(system, q, hinge, turn):
+            deep = np.inf
         for _ in range(abs(turn)):
             q[hinge] += 1 if turn > 0 else -1
             if not state_is_valid(system, q):
@@ -151,21 +163,39 @@ def path_overlap(
     return found
 
 
-def _barrel_pairs(system: HingeSystem, q: NDArray[np.int64], hinge: int) -> list[tuple[int, int]]:
-    """Pairs of hinges whose barrels coincide in state `q`, one of them carried by `hinge`."""
+def barrel_meetings(
+    system: HingeSystem, quarters: NDArray[np.integer], hinge: int, turn: int, step_deg: float = 0.5
+) -> list[tuple[int, int]]:
+    """Pairs of hinges (carried, staying) whose barrels come too near while one hinge turns.
+
+    Parameters
+    ----------
+    system : HingeSystem
+        On whole cells.
+    quarters, hinge, turn, step_deg
+        As for :func:`turn_overlap`.
+    """
+    pose = poses(system, np.asarray(quarters, dtype=float))
     inside = subtree(system, hinge)
-    at: dict[tuple[float, ...], list[int]] = {}
-    per = len(_barrels(system, poses(system, q.astype(float)))) // max(1, len(system.parent))
-    for index, key in enumerate(_barrels(system, poses(system, q.astype(float)))):
-        at.setdefault(key, []).append(index // per)
-    found = []
-    for hinges in at.values():
-        for g in hinges:
-            for other in hinges:
-                carried = inside[g + 1] and g != hinge
-                if carried and not (inside[other + 1] and other != hinge):
-                    found.append((g, other))
-    return found
+    middles = np.asarray(system.point2) / 2.0
+    half = (0.5 - INSET) * np.eye(3)[np.asarray(system.axis, dtype=int)]
+    ends = np.stack([middles - half, middles + half], axis=1)
+    frame = pose[1:]
+    ends = np.einsum("hij,hkj->hki", frame[:, :3, :3], ends) + frame[:, None, :3, 3]
+    carried = [g for g in range(len(ends)) if inside[g + 1] and g != hinge]
+    staying = [g for g in range(len(ends)) if not inside[g + 1]]
+    parent = pose[system.parent[hinge]]
+    axis = parent[:3, :3] @ np.eye(3)[system.axis[hinge]]
+    point = (parent @ np.append(middles[hinge], 1.0))[:3]
+    found = set()
+    for share in np.linspace(0.0, 1.0, max(1, round(90.0 * abs(turn) / step_deg)) + 1):
+        spin = rotation_about(point, axis, 90.0 * turn * share)
+        for g in carried:
+            moved = ends[g] @ spin[:3, :3].T + spin[:3, 3]
+            for other in staying:
+                if segment_distance(moved, ends[other]) < LEAST - 1e-3:
+                    found.add((g, other))
+    return sorted(found)
 
 
 def stuck(system: HingeSystem, quarters: NDArray[np.integer], way: int) -> int:
@@ -182,9 +212,7 @@ def stuck(system: HingeSystem, quarters: NDArray[np.integer], way: int) -> int:
         deep = turn_overlap(system, quarters, h, turn)
         body = np.asarray(system.body)
         ways = [chain[body[i]] ^ chain[body[j]] for i, j in np.argwhere(deep > TOUCH)]
-        after = np.array(quarters, dtype=np.int64)
-        after[h] += turn
-        for g, other in _barrel_pairs(system, after, h):
+        for g, other in barrel_meetings(system, quarters, h, turn):
             # Each barrel goes with both of its bodies: take the two that are nearest.
             ends = [
                 chain[a] ^ chain[b]

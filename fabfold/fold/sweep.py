@@ -13,6 +13,11 @@ square's arc, turned back by 90°, begins. All other quarters and the other sens
 
 The arcs' ends are compared through ``r²``, and every threshold is an integer: looking once between
 each two neighbouring integers decides the question exactly.
+
+Hinge barrels lie on lattice edges and stand out of the cubes, so a barrel that is carried along may
+run into one that stays. Here it is enough to know the barrels' axes, less a piece at each end, and
+how near two of them may come. Axes along the hinge meet only axes along the hinge in the same
+layer, and axes across it only axes across it at the same height: a plane question again.
 """
 
 # mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
@@ -25,6 +30,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from fabfold.fold.barrels import INSET, LEAST
 
 __all__ = ["SweepTable", "arcs_overlap", "sweep_table"]
 
@@ -65,11 +72,19 @@ class SweepTable(NamedTuple):
         ``cells[start[a * side + b] : start[a * side + b + 1]]`` belongs to square ``(a, b)``.
     cells : (k, 2) int16 array
         The squares swept, without the square itself.
+    edge_start : (4 * side * side + 1,) int32 array
+        ``edges[edge_start[i] : edge_start[i + 1]]`` with ``i = x * 2 * side + y`` belongs to the
+        lattice edge whose middle is at ``(x, y) / 2``, x > 0 and y >= 0. Two even numbers: an edge
+        along the axis; x odd: an edge along x; y odd: along y.
+    edges : (m, 2) int16 array
+        Twice the middles of the edges whose barrels are met.
     """
 
     side: int
     start: NDArray[np.int32]
     cells: NDArray[np.int16]
+    edge_start: NDArray[np.int32]
+    edges: NDArray[np.int16]
 
 
 @njit(cache=True)
@@ -102,18 +117,110 @@ def _fill(side: int, start: NDArray[np.int32], cells: NDArray[np.int16], write: 
             start[a * side + b + 1] = count
 
 
+@njit(cache=True)
+def _point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Distance of a point from a segment."""
+    dx = bx - ax
+    dy = by - ay
+    length = dx * dx + dy * dy
+    share = 0.0
+    if length > 0.0:
+        share = min(1.0, max(0.0, ((px - ax) * dx + (py - ay) * dy) / length))
+    return np.hypot(px - ax - share * dx, py - ay - share * dy)
+
+
+@njit(cache=True)
+def _barrels_meet(x: int, y: int, c: int, d: int, inset: float, least: float) -> bool:
+    """Whether the barrel with middle (x, y) / 2 meets that with middle (c, d) / 2 in the turn."""
+    half = 0.5 - inset
+    # Half lengths of the two axes; edges along the axis of the turn are points here.
+    mx = half if x % 2 != 0 else 0.0
+    my = half if y % 2 != 0 else 0.0
+    sx = half if c % 2 != 0 else 0.0
+    sy = half if d % 2 != 0 else 0.0
+    lever = 0.5 * np.hypot(x, y) + half
+    angle = 0.0
+    while True:
+        cosine = np.cos(angle)
+        sine = np.sin(angle)
+        ax = (0.5 * x - mx) * cosine - (0.5 * y - my) * sine
+        ay = (0.5 * x - mx) * sine + (0.5 * y - my) * cosine
+        bx = (0.5 * x + mx) * cosine - (0.5 * y + my) * sine
+        by = (0.5 * x + mx) * sine + (0.5 * y + my) * cosine
+        px = 0.5 * c - sx
+        py = 0.5 * d - sy
+        qx = 0.5 * c + sx
+        qy = 0.5 * d + sy
+        away = min(
+            _point_distance(ax, ay, px, py, qx, qy),
+            _point_distance(bx, by, px, py, qx, qy),
+            _point_distance(px, py, ax, ay, bx, by),
+            _point_distance(qx, qy, ax, ay, bx, by),
+        )
+        if away < least:  # segments that cross have been near before
+            return True
+        if angle >= 0.5 * np.pi:
+            return False
+        angle = min(0.5 * np.pi, angle + max(1e-3, (away - 0.9 * least) / lever))
+
+
+@njit(cache=True)
+def _fill_edges(
+    side: int, start: NDArray[np.int32], inset: float, least: float
+) -> NDArray[np.int16]:
+    """Fill ``SweepTable.edge_start``; returns ``SweepTable.edges``."""
+    edges = np.empty((1024, 2), np.int16)
+    count = 0
+    for x in range(2 * side):
+        for y in range(2 * side):
+            radius = np.hypot(x, y)
+            valid = x > 0 and (x % 2 == 0 or y % 2 == 0) and radius < 2.0 * side
+            # Edges that are too far in or out for any angle need no look.
+            near = 2.0 * (least + 1.0 - 2.0 * inset)
+            low = max(1.0, radius - near) ** 2
+            high = (radius + near) ** 2
+            most = int(radius + near) + 1 if valid else -1
+            along = x % 2 == 0 and y % 2 == 0
+            for c in range(-most, most + 1):
+                for d in range(-1, most + 1):
+                    if c * c + d * d < low or c * c + d * d > high or (c == x and d == y):
+                        continue
+                    if (c % 2 == 0 and d % 2 == 0) != along or (c % 2 != 0 and d % 2 != 0):
+                        continue
+                    if _barrels_meet(x, y, c, d, inset, least):
+                        if count == len(edges):
+                            wider = np.empty((2 * count, 2), np.int16)
+                            wider[:count] = edges
+                            edges = wider
+                        edges[count, 0] = c
+                        edges[count, 1] = d
+                        count += 1
+            start[x * 2 * side + y + 1] = count
+    return edges[:count].copy()
+
+
 @cache
-def _table(side: int) -> SweepTable:
+def _table(side: int, inset: float, least: float) -> SweepTable:
     start = np.zeros(side * side + 1, dtype=np.int32)
     _fill(side, start, np.zeros((0, 2), dtype=np.int16), False)
     cells = np.zeros((int(start[-1]), 2), dtype=np.int16)
     _fill(side, start, cells, True)
-    return SweepTable(side, start, cells)
+    edge_start = np.zeros(4 * side * side + 1, dtype=np.int32)
+    edges = _fill_edges(side, edge_start, inset, least)
+    return SweepTable(side, start, cells, edge_start, edges)
 
 
-def sweep_table(reach: int) -> SweepTable:
-    """Table for all squares up to `reach` from the axis; made once for each power of two."""
+def sweep_table(reach: int, *, halves: bool = False) -> SweepTable:
+    """Table for everything up to `reach` from the axis; made once for each half power of two.
+
+    Parameters
+    ----------
+    reach : int
+    halves : bool
+        The lattice is one of half cells: barrels are two edges long, and the two ends of an edge
+        cannot be told apart, so that only barrels that really cross or coincide count as meeting.
+    """
     side = 16
     while side < reach:
-        side *= 2
-    return _table(side)
+        side = side * 3 // 2 if side % 3 else side * 4 // 3
+    return _table(side, 0.25 if halves else INSET, 0.3 if halves else LEAST - 1e-3)

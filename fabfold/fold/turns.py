@@ -69,7 +69,7 @@ def world_turn(
 
 
 @njit(cache=True)
-def obstacles(  # noqa: PLR0912 - one pass, kept whole for speed
+def obstacles(  # noqa: PLR0912, PLR0915 - one pass, kept whole for speed
     mech: Mechanism,
     at: Scene,
     table: SweepTable,
@@ -141,21 +141,37 @@ def obstacles(  # noqa: PLR0912 - one pass, kept whole for speed
         g = mech.barrel[e, 0]
         if g <= k or g + 1 >= high:
             continue
+        x = at.edge[e, 1 + u] - pivot[u]
+        y = at.edge[e, 1 + v] - pivot[v]
+        # Turn the edge into the first quadrant; (ux, uy), (vx, vy) turn what it meets back.
+        if x > 0 and y >= 0:
+            ux, uy, vx, vy = 1, 0, 0, 1
+        elif y > 0:
+            x, y, ux, uy, vx, vy = y, -x, 0, -1, 1, 0
+        elif x < 0:
+            x, y, ux, uy, vx, vy = -x, -y, -1, 0, 0, -1
+        else:
+            x, y, ux, uy, vx, vy = -y, x, 0, 1, -1, 0
+        entry = x * 2 * table.side + y
         middle[axis] = at.edge[e, 1 + axis]
-        middle[u] = pivot[u] - (at.edge[e, 1 + v] - pivot[v])
-        middle[v] = pivot[v] + (at.edge[e, 1 + u] - pivot[u])
-        along = at.edge[e, 0]
-        if along != axis:
-            along = u if along == v else v
-        other = at.edges[edge_slot(side, along, middle[0], middle[1], middle[2])] - 1
-        if other >= 0 and (other < k or other + 1 >= high):
-            if count < len(found):
-                found[count, 0] = mech.up[g]
-                inside = other + 1 <= low < mech.end[other]
-                found[count, 1] = other + 1 if inside else mech.up[other]
-            count += 1
-            if count >= limit:
-                return count
+        for i in range(table.edge_start[entry], table.edge_start[entry + 1]):
+            c = table.edges[i, 0]
+            d = table.edges[i, 1]
+            c, d = c * ux + d * uy, c * vx + d * vy
+            middle[u] = pivot[u] + c
+            middle[v] = pivot[v] + d
+            along = axis
+            if at.edge[e, 0] != axis:
+                along = u if c % 2 != 0 else v
+            other = at.edges[edge_slot(side, along, middle[0], middle[1], middle[2])] - 1
+            if other >= 0 and (other < k or other + 1 >= high):
+                if count < len(found):
+                    found[count, 0] = mech.up[g]
+                    inside = other + 1 <= low < mech.end[other]
+                    found[count, 1] = other + 1 if inside else mech.up[other]
+                count += 1
+                if count >= limit:
+                    return count
     return count
 
 
