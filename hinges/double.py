@@ -34,6 +34,7 @@ from .plan_double import (
     link_pose,
     plan_double,
 )
+from .single import keep_joints
 
 if TYPE_CHECKING:
     from build123d import RotationLike
@@ -249,7 +250,8 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
         Returns
         -------
         parent, link, child : Part
-            With their joints, as on the hinge's own bodies.
+            With their joints, as on the hinge's own bodies. Rigid and revolute joints that the
+            bodies had are kept.
 
         Raises
         ------
@@ -270,6 +272,7 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
                 )
             fitted.label = body.label or name
             fitted.color = body.color
+            keep_joints(body, fitted)
             made.append(fitted)
         link = one_part([self.link.moved(place).solid()])
         link.label, link.color = "link", Color(*COLORS["link"])

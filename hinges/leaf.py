@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from .errors import HingeError
 from .fit import at_least
-from .shapes import Moved, Shape, Turned, box
+from .shapes import Moved, Prism, Shape, Turned, box
 from .train import Train
 
 __all__ = ["Bracket", "Leaf"]
@@ -23,10 +23,14 @@ class Bracket:
         knuckles and 1.2 mm of material behind it when left out.
     depth : float, optional
         From the axis into the body along the shared face, in mm; `width` when left out.
+    gusset : bool
+        Slope the bar's lower side at 45° down to the shared face, so that it prints without support
+        inside a wall thinner than itself, in a body that stands with y up.
     """
 
     width: float | None = None
     depth: float | None = None
+    gusset: bool = False
 
     def limits(self, train: Train, gap: float) -> tuple[float, float, float, float]:
         """Near and far limit across the face, near and far limit along it, in mm."""
@@ -55,7 +59,13 @@ class Bracket:
         """Draw the bar on one side: -1 parent, +1 child."""
         near, far, top, bottom = self.limits(train, gap)
         west, east = sorted((side * near, side * far))
-        return (box(west, east, -bottom, -top, train.start, train.end),)
+        if not self.gusset:
+            return (box(west, east, -bottom, -top, train.start, train.end),)
+        low = -bottom - (far - near)
+        corners = [(near, low), (far, -bottom), (far, -top), (near, -top)]
+        if side < 0.0:
+            corners = [(-x, y) for x, y in reversed(corners)]
+        return (Prism(tuple(corners), train.start, train.end),)
 
     def drilled(self, train: Train, gap: float, side: float) -> tuple[Shape, ...]:
         """Give what is cut through it: nothing."""

@@ -266,7 +266,11 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
         return drawn
 
     def fit(
-        self, parent: Part | Solid, child: Part | Solid, at: Location | Plane | None = None
+        self,
+        parent: Part | Solid,
+        child: Part | Solid,
+        at: Location | Plane | None = None,
+        joint: str = "hinge",
     ) -> tuple[Part, Part]:
         """Let the hinge into two bodies.
 
@@ -277,11 +281,13 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
             away from the face that they share, and from the one that they fold together on.
         at : Location or Plane, optional
             Where the hinge's frame lies; see :func:`hinge_location`.
+        joint : str
+            Name of the joints on both bodies; for a body with several hinges.
 
         Returns
         -------
         parent, child : Part
-            With the joints "hinge" on the axis.
+            With the joints on the axis. Rigid and revolute joints that the bodies had are kept.
 
         Raises
         ------
@@ -302,15 +308,24 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
                 )
             fitted.label = body.label or side
             fitted.color = body.color
+            keep_joints(body, fitted)
             made.append(fitted)
-        self._join(made[0], made[1], place)
-        return made[0], made[1]
-
-    def _join(self, parent: Part, child: Part, place: Location) -> None:
         plane = Plane(place)
         axis = Axis(plane.origin, plane.z_dir)
-        joint = RevoluteJoint("hinge", parent, axis=axis, angular_range=self.spec.angular_range)
-        RigidJoint("hinge", child, joint.relative_axis.location * Rotation(0, 0, self.spec.angle))
+        turning = RevoluteJoint(joint, made[0], axis=axis, angular_range=self.spec.angular_range)
+        RigidJoint(joint, made[1], turning.relative_axis.location * Rotation(0, 0, self.spec.angle))
+        return made[0], made[1]
+
+
+def keep_joints(body: Part | Solid, fitted: Part) -> None:
+    """Bind copies of a body's rigid and revolute joints to the part that it became."""
+    for label, joint in body.joints.items():
+        if isinstance(joint, RigidJoint):
+            RigidJoint(label, fitted, joint.location)
+        elif isinstance(joint, RevoluteJoint):
+            plane = Plane(joint.location)
+            axis = Axis(plane.origin, plane.z_dir)
+            RevoluteJoint(label, fitted, axis=axis, angular_range=joint.angular_range)
 
 
 class HingeHalf(BasePartObject):  # type: ignore[misc]

@@ -1,0 +1,76 @@
+"""Seconds to build hinges: single, double, sixty of them with equal ones cached, the coupon.
+
+python benchmarks/hinges_build.py [--repeat 5]
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from hinges import Coupon, DoubleHinge, SingleHinge, write_coupon
+from hinges import brep as _brep
+from hinges import double as _double
+from hinges import single as _single
+from hinges.mesh import _double as _double_mesh
+from hinges.mesh import _single as _single_mesh
+from hinges.mesh import double_hinge_meshes, single_hinge_meshes
+from hinges.plan import plan_single
+from hinges.plan_double import plan_double
+
+
+def forget() -> None:
+    """Empty every cache, so that a build starts from nothing."""
+    caches = (plan_single, plan_double, _single._half, _single._carve, _double._piece)
+    for cache in (*caches, _double._carve, _single_mesh, _double_mesh):
+        cache.cache_clear()
+
+
+def sixty() -> None:
+    """Twenty placements each of two singles and one double, as a kit of equal voxels has."""
+    for _ in range(20):
+        for hinge in (SingleHinge(20, clearance=0.3), SingleHinge(25, knuckles=5, clearance=0.3)):
+            _ = hinge.parent_half, hinge.child_half, hinge.parent_carve, hinge.child_carve
+        double = DoubleHinge(20, clearance=0.3)
+        _ = double.parent_half, double.link, double.child_half
+
+
+def timed(work: Callable[[], object], repeat: int) -> float:
+    """Median seconds of `repeat` runs, each from empty caches."""
+    spent = []
+    for _ in range(repeat):
+        forget()
+        start = time.perf_counter()
+        work()
+        spent.append(time.perf_counter() - start)
+    return statistics.median(spent)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeat", type=int, default=5)
+    repeat = parser.parse_args().repeat
+    assert _brep
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "coupon.3mf"
+        rows: list[tuple[str, Callable[[], object], float | None]] = [
+            ("single hinge, exact", lambda: SingleHinge(20, clearance=0.3), 0.1),
+            ("double hinge, exact", lambda: DoubleHinge(20, clearance=0.3), 0.5),
+            ("60 hinges, equal ones cached", sixty, None),
+            ("single hinge, mesh", lambda: single_hinge_meshes(20, 0.3), None),
+            ("double hinge, mesh", lambda: double_hinge_meshes(20, 0.3), None),
+            ("coupon, exact", Coupon, 5.0),
+            ("coupon, 3MF and guide", lambda: write_coupon(path), 5.0),
+        ]
+        SingleHinge(30, clearance=0.3)  # load the kernel
+        print(f"{'what':32} {'s':>8} {'aim':>6}")
+        for name, work, aim in rows:
+            print(f"{name:32} {timed(work, repeat):8.3f} {aim if aim else '':>6}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+"""The numbered examples run, and what they make is sound."""
+
+import importlib.util
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+
+HOME = Path(__file__).parents[2] / "examples" / "hinges"
+NAMES = sorted(path.stem for path in HOME.glob("[0-9]*.py"))
+
+
+def load(name):
+    spec = importlib.util.spec_from_file_location(f"example_{name}", HOME / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def apart(one, other):
+    return one.solid().shells()[0].distance_to(other.solid().shells()[0])
+
+
+def test_examples_are_numbered():
+    assert [name[:2] for name in NAMES] == [f"{i:02d}" for i in range(1, len(NAMES) + 1)]
+    assert len(NAMES) >= 4
+
+
+def test_lidded_box_opens_and_closes():
+    box, lid = load("01_lidded_box_build123d").main()
+    assert len(box.solids()) == len(lid.solids()) == 1
+    for angle in (0, 60, 120, 180):
+        box.joints["hinge"].connect_to(lid.joints["hinge"], angle=angle)
+        assert apart(box, lid) == pytest.approx(0.3, abs=1e-5)
+    assert pytest.approx(36.3) == lid.bounding_box().max.Z
+
+
+def test_the_same_box_in_cadquery():
+    pytest.importorskip("cadquery", reason="CadQuery is not installed in this environment")
+    box, lid = load("02_lidded_box_cadquery").main()
+    one, other = load("01_lidded_box_build123d").main()
+    assert box.val().Volume() == pytest.approx(one.volume, rel=1e-6)
+    assert lid.val().Volume() == pytest.approx(other.volume, rel=1e-6)
+    assert box.val().distance(lid.val()) == pytest.approx(0.3, abs=1e-6)
+
+
+def test_phone_stand_leans_and_folds():
+    module = load("03_phone_stand_build123d")
+    base, back, link, lip = bodies = module.main()
+    assert all(len(body.solids()) == 1 for body in bodies)
+    for one, other in combinations(bodies, 2):
+        assert apart(one, other) >= 0.3 - 1e-5
+    base.joints["back"].connect_to(back.joints["back"], angle=60)
+    assert apart(base, back) == pytest.approx(0.3, abs=1e-5)
+    base.joints["back"].connect_to(back.joints["back"], angle=module.LEAN)
+    assert apart(base, back) == pytest.approx(0.0, abs=1e-5)  # on its stop
+    base.joints["link"].connect_to(link.joints["parent"], angle=180)
+    link.joints["child"].connect_to(lip.joints["link"], angle=0)
+    assert pytest.approx(0.15) == lip.bounding_box().min.Z  # on the base
+    assert apart(base, lip) >= 0.3 - 1e-5
+    base.joints["link"].connect_to(link.joints["parent"], angle=0)
+    link.joints["child"].connect_to(lip.joints["link"], angle=180)
+    assert lip.center().Z < -module.THICK  # under it
+    assert apart(base, lip) >= 0.3 - 1e-5
+
+
+def test_coupon_with_clearances_of_ones_own(capsys):
+    coupon = load("04_tolerance_coupon").main()
+    assert len(coupon.solids()) == 10
+    assert "0.30 mm: plays 0.42 mm across" in capsys.readouterr().out
