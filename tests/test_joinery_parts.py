@@ -225,17 +225,18 @@ def test_segment_distance():
 
 
 def test_barrels_that_swing_into_each_other_are_seen_before_cutting():
-    """The third hinge's barrel passes a barrel of the first body while the second one turns."""
-    tree = strip_tree(8, [1, -1, 1])
-    motion = motion_of_order(tree, [2, 1, 0])
-    assert first_encounter(tree, motion, inset=0.265, least=0.265) is None
-    # Turning only the first hinge past the place of the second one brings barrels together:
-    # body 1 and 2 folded, then folded on, the third barrel swings over the first.
-    system = hinge_system(tree)
-    rolled = np.array([[0, 2], [1, 2], [2, 2]])
-    found = encounter_on_lattice(system, rolled)
-    wanted = _nearest_by_brute_force(tree, rolled)
-    assert (found is not None) == (wanted < 0.265 - 1e-3)
+    zigzag = strip_tree(8, [1, -1, 1])
+    flat = np.array([[2, 2], [1, -2], [0, 2]])
+    assert encounter_on_lattice(hinge_system(zigzag), flat) is None
+    assert _nearest_by_brute_force(zigzag, flat) > 0.265
+    motion = motion_of_order(zigzag, [2, 1, 0])
+    assert first_encounter(zigzag, motion, inset=0.265, least=0.265) is None
+    # All hinges on one side: rolled up, the third barrel comes to lie on the first.
+    roll = strip_tree(8, [1, 1, 1])
+    rolled = np.array([[0, 1], [1, 1], [2, 1], [0, 1], [1, 1]])
+    found = encounter_on_lattice(hinge_system(roll), rolled)
+    assert (found.move, found.turning, found.moving, found.resting) == (5, 1, 2, 0)
+    assert found.distance == pytest.approx(_nearest_by_brute_force(roll, rolled), abs=1e-3)
 
 
 def _nearest_by_brute_force(tree, path) -> float:
@@ -248,7 +249,7 @@ def _nearest_by_brute_force(tree, path) -> float:
     )
     angles, nearest = np.zeros(len(tree.hinges)), np.inf
     for hinge, quarters in path.tolist():
-        for share in np.linspace(0.0, 1.0, 400):
+        for share in np.linspace(0.0, 1.0, 91):
             now = angles.copy()
             now[hinge] += 90.0 * quarters * share
             poses = tree.body_poses(now)
