@@ -36,10 +36,11 @@ def check_tree(tree: FoldTree) -> list[str]:
     found = _shapes(tree)
     if found:
         return found
-    found += _cells(tree)
-    found += _edges(tree)
-    found += _bodies(tree)
-    found += _hinges(tree)
+    # Later checks look things up by what earlier ones found sound.
+    found = _cells(tree) + _edges(tree)
+    if found:
+        return found
+    found = _bodies(tree) + _hinges(tree)
     if found:
         return found
     return _kinematics(tree) + _segments(tree)

@@ -254,7 +254,7 @@ class _Search:
                 self.statistics.closed += 1
                 left = self.remaining(tree)
                 trouble = left > 0
-                penalty = self.scale.stuck * float(left.sum()) / (2 * len(left))
+                penalty = self.scale.stuck * float(left.sum()) / max(1, 2 * len(left))
             if best is None or penalty < best.penalty:
                 focus = np.unique(tree.joints[trouble, :2]).astype(np.int32)
                 best = _State(pose, energy, tree, penalty, focus)
