@@ -12,7 +12,7 @@ from fabfold.tree.effort import Effort
 from fabfold.tree.model import Body, Edge, FoldTree
 from fabfold.tree.solve import solve
 
-QUICK = Effort(folding=200, polishing=50, restarts=10)
+QUICK = Effort(polishing=50, restarts=10)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from fabfold.tree.effort import EFFORTS, Effort
 from fabfold.tree.solve import grow, solve
 from fabfold.tree.system import hinge_system
 
-QUICK = Effort(folding=300, polishing=100, restarts=10)
+QUICK = Effort(polishing=100, restarts=10)
 
 
 def energies(candidates):
@@ -158,7 +158,7 @@ def test_nothing_folds_without_budget(dog):
             return np.ones(len(system.parent), dtype=np.int32)
 
     with pytest.raises(NoFoldError, match="none of"):
-        solve(dog, 0, Stubborn(), Effort(folding=5, restarts=2))
+        solve(dog, 0, Stubborn(), Effort(restarts=2))
 
 
 def test_efforts_grow():

@@ -36,8 +36,7 @@ class SpanningTree:
     @property
     def keys(self) -> set[tuple[int, int]]:
         """Voxel pairs that carry a hinge, smaller voxel first."""
-        pairs = np.sort(self.joints[:, :2], axis=1)
-        return {(int(a), int(b)) for a, b in pairs}
+        return {(min(a, b), max(a, b)) for a, b in self.joints[:, :2].tolist()}
 
 
 @dataclass(frozen=True)
@@ -61,12 +60,11 @@ class HingeChoice:
 
     def wanted(self, keys: set[tuple[int, int]], bonus: float) -> NDArray[np.float64]:
         """Preference (smaller is sooner) for hinges between the voxel pairs of `keys`."""
-        return np.array(
-            [
-                -bonus if (int(u), int(v)) in keys or (int(v), int(u)) in keys else 0.0
-                for u, v in self.found[:, :2]
-            ]
-        )
+        wanted = np.zeros(len(self.found))
+        for row, (u, v) in enumerate(self.found[:, :2].tolist()):
+            if (u, v) in keys or (v, u) in keys:
+                wanted[row] = -bonus
+        return wanted
 
     def tree(
         self, wanted: NDArray[np.float64], generator: NDArray[np.uint64]

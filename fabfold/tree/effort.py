@@ -21,8 +21,10 @@ class Effort:
         Fresh starts of the folding phase; the search goes on to the next while none folds.
     removals : int
         Large-neighbourhood moves, per start, until hinges that can turn join all the clusters.
-    folding : int
-        Candidates judged per start until one folds (phase A).
+    closing : int
+        Candidates judged per start and voxel until the closure test passes (phase A).
+    looking : int
+        Looks of the planner per start and voxel until a tree folds (phase A).
     polishing : int
         Candidates judged after that to lower the energy (phase B).
     least, most : int
@@ -43,9 +45,10 @@ class Effort:
 
     beam: int = 10
     roots: int = 100
-    restarts: int = 6
+    restarts: int = 30
     removals: int = 30000
-    folding: int = 2500
+    closing: int = 20
+    looking: int = 3
     polishing: int = 2500
     least: int = 4
     most: int = 16
@@ -59,7 +62,7 @@ class Effort:
 
 #: Effort by name, as the command line offers it.
 EFFORTS: dict[str, Effort] = {
-    "quick": Effort(restarts=4, folding=1500, polishing=500),
+    "quick": Effort(restarts=10, polishing=300),
     "normal": Effort(),
-    "thorough": Effort(restarts=12, folding=6000, polishing=10000),
+    "thorough": Effort(restarts=100, polishing=10000),
 }

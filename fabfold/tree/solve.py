@@ -216,17 +216,23 @@ class _Search:
     def trees(
         self, choice: HingeChoice, keys: set[tuple[int, int]], count: int
     ) -> Iterator[SpanningTree]:
-        """Random spanning trees; the first ones keep most of the hinges in `keys`."""
+        """Different random spanning trees; the first ones keep most of the hinges in `keys`."""
+        seen: set[frozenset[tuple[int, int]]] = set()
+        kept = choice.wanted(keys, 1.0)
         for k in range(count):
-            bonus = (2.0, 0.7, 0.0)[min(k, 2)] if keys else 0.0
-            wanted = choice.wanted(keys, bonus)
+            bonus = (2.0, 0.7, 0.0)[min(k, 2)]
             for _ in range(8):
                 # Hinges on one lattice edge exclude each other, so a random choice may not span.
-                tree = choice.tree(wanted, self.generator)
+                tree = choice.tree(bonus * kept, self.generator)
                 if tree is not None:
-                    self.statistics.trees += 1
-                    yield tree
                     break
+            else:
+                continue
+            mark = frozenset(tree.keys)
+            if mark not in seen:
+                seen.add(mark)
+                self.statistics.trees += 1
+                yield tree
 
     # --- judging ---------------------------------------------------------------------------
 
@@ -268,17 +274,19 @@ class _Search:
 
     def fold(self, start: _State) -> _State | None:
         """Phase A: trade energy for foldability until a tree folds."""
-        scale = self.scale
+        scale, count = self.scale, len(self.problem)
         now = self.judged(start.pose, start.energy, set(), math.inf)
         if now is None:
             return None
-        steps = self.effort.folding
-        for step in range(steps):
+        # Closing (no hinge stuck for good) costs little a step; looks at the planner cost much.
+        closing, looking = self.effort.closing * count, self.effort.looking * count
+        glances = step = 0
+        while step < closing and glances < looking:
             if now.penalty == 0:
                 return now
-            heat = scale.hot * (scale.cold / scale.hot) ** (step / steps)
-            slack = heat * self.rng.exponential()
-            value = scale.cost * now.energy + now.penalty + slack
+            done = max(step / closing, glances / looking)
+            heat = scale.hot * (scale.cold / scale.hot) ** done
+            value = scale.cost * now.energy + now.penalty + heat * self.rng.exponential()
             assert now.tree is not None
             if self.rng.random() < 0.05:
                 pose, energy = now.pose, now.energy
@@ -286,9 +294,14 @@ class _Search:
                 focus = now.focus if self.rng.random() < scale.focus else _NOWHERE
                 found = self.neighbour(now.pose, value / scale.cost, 20, 10.0, focus)
                 if found is None:
+                    step += 1
                     continue
                 pose, energy, _ = found
+            before = self.statistics.glances
             fresh = self.judged(pose, energy, now.tree.keys, value - scale.cost * energy)
+            looked = self.statistics.glances - before
+            glances += looked
+            step += looked == 0
             if fresh is not None:
                 now = fresh
         return now if now.penalty == 0 else None
