@@ -1,7 +1,7 @@
-"""The full grid of hinge parameters, every accepted one measured: python benchmarks/hinges_grid.py
+"""Measure every accepted combination of the full grid of hinge parameters.
 
-For each pin and process: combinations accepted, refused by which rule, halves that are not one valid
-solid, largest error of the measured gap at 19 angles and largest overlap. The tests run a sample.
+For each pin: combinations measured, halves that are not one valid solid, largest error of the gap
+at 19 angles, largest overlap, and which rule refused how many. The tests run a sample of it.
 """
 
 from __future__ import annotations

@@ -95,11 +95,53 @@ class Process:
 PROCESSES: Final[dict[str, Process]] = {
     process.name: process
     for process in (
-        Process("fdm", 0.30, 0.30, 0.30, 0.50, 0.80, "makers' reports: 0.3 to 0.5 a side"),
-        Process("sla", 0.25, 0.25, 0.20, 0.30, 0.60, "makers' reports: 0.2 to 0.3 a side"),
-        Process("sls", 0.60, 0.60, 0.50, 0.60, 0.80, "makers' reports: 0.6 a side"),
-        Process("mjf", 0.50, 0.50, 0.40, 0.60, 0.80, "makers' reports: 0.4 to 0.6 in place"),
-        Process("polyjet", 0.35, 0.35, 0.30, 0.40, 0.80, "makers' reports: 0.3 to 0.4 a side"),
+        Process(
+            "fdm",
+            0.30,
+            0.30,
+            0.30,
+            0.50,
+            0.80,
+            "makers' reports of printed-in-place hinges, 0.3 to 0.5 a side; print services ask for "
+            "0.4 (makelab.com) to 0.5 (arti90.com/en/design-clues) between moving parts",
+        ),
+        Process(
+            "sla",
+            0.25,
+            0.25,
+            0.20,
+            0.30,
+            0.60,
+            "0.25 for parts that fit (help.makelab.com), 0.3 for loose ones (hycubeworks.in)",
+        ),
+        Process(
+            "sls",
+            0.60,
+            0.60,
+            0.50,
+            0.60,
+            0.80,
+            "0.5 between moving parts (arti90.com/en/design-clues), 0.6 in makers' hinges",
+        ),
+        Process(
+            "mjf",
+            0.50,
+            0.50,
+            0.30,
+            0.70,
+            0.80,
+            "at least 0.5 printed together (solidlines.no); HP's guide: 0.7, down to 0.3 beside "
+            "walls under 3 mm (amuse3d.in)",
+        ),
+        Process(
+            "polyjet",
+            0.35,
+            0.35,
+            0.30,
+            0.40,
+            0.80,
+            "0.3 to 0.4 on all sides of moving parts and hinges (forgelabs.ca/guidelines)",
+        ),
     )
 }
 """Defaults by process. Print a coupon (:class:`hinges.Coupon`) for a figure of your own."""

@@ -366,27 +366,24 @@ class ScrewPin(Pin):
         screw = self.screw
         radius = 0.5 * screw.diameter
         base = train.start
+        # Where the screw cuts its own thread only its core is drawn.
+        thread = train.spans[-1].start
+        core = 0.5 * screw.tap if self.end == "tap" else radius
+        shank: tuple[Point, ...] = ((radius, thread), (core, thread)) if core < radius else ()
+        shank = (*shank, (core, train.end), (0.0, train.end))
         if self.head == "countersunk":
             slope = 0.5 * screw.sunk
-            outline: tuple[Point, ...] = (
+            head: tuple[Point, ...] = (
                 (0.0, base),
                 (slope, base),
                 (radius, base + slope - radius),
-                (radius, train.end),
-                (0.0, train.end),
             )
         else:
             foot = base + (screw.cap_height if self.sunk else 0.0)
             top = foot - screw.cap_height
             cap = 0.5 * screw.cap
-            outline = (
-                (0.0, top),
-                (cap, top),
-                (cap, foot),
-                (radius, foot),
-                (radius, train.end),
-                (0.0, train.end),
-            )
+            head = ((0.0, top), (cap, top), (cap, foot), (radius, foot))
+        outline = (*head, *shank)
         drawn: list[Shape] = [Turned(outline)]
         if self.end == "nut":
             start = train.end - (screw.nut_height if self.sunk else 0.0)
