@@ -101,7 +101,7 @@ class Pin(ABC):
 
     @abstractmethod
     def rings(self, train: Train) -> tuple[Ring, ...]:
-        """Where pin and bores face one another, for :func:`hinges.play.play`."""
+        """Where pin and bores face one another, for :func:`hinges.wobble.play`."""
 
     def bores(self, train: Train, roof: Roof) -> tuple[Owned, ...]:
         """Give what is cut out of the finished halves: roofs, nut pockets."""

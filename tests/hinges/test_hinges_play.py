@@ -6,7 +6,7 @@ import pytest
 from hinges import DoubleHinge, FilamentPin, HingeError, SingleHinge, StraightPin
 from hinges.mesh import half_of
 from hinges.plan import SingleSpec, plan_single
-from hinges.play import Play, chain, contacts, play, rock
+from hinges.wobble import Play, chain, contacts, play, rock
 
 ANGLE = 60.0
 
@@ -105,3 +105,10 @@ def test_refusals():
     with pytest.raises(HingeError, match="chain"):
         chain([])
     assert Play(1, 1, (1, 1), 0).at(10) == 1
+
+
+def test_the_public_name_is_the_function_whatever_was_imported_first():
+    import hinges
+    from hinges import wobble
+
+    assert hinges.play is wobble.play
