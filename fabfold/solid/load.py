@@ -78,7 +78,7 @@ def load_solid(source: str | Path) -> Solid:
 
 
 def _reader(path: Path) -> Callable[[Path], RawMesh]:
-    from fabfold.solid import read_binary, read_stl, read_text
+    from fabfold.solid import read_binary, read_step, read_stl, read_text
 
     readers = {
         ".stl": read_stl.read_stl,
@@ -87,8 +87,8 @@ def _reader(path: Path) -> Callable[[Path], RawMesh]:
         ".ply": read_binary.read_ply,
         ".glb": read_binary.read_glb,
         ".3mf": read_binary.read_3mf,
-        ".step": read_binary.read_step,
-        ".stp": read_binary.read_step,
+        ".step": read_step.read_step,
+        ".stp": read_step.read_step,
     }
     known = ", ".join(suffix[1:].upper() for suffix in FORMATS if suffix != ".stp")
     if path.is_dir():

@@ -1,4 +1,4 @@
-"""PLY, GLB, 3MF and STEP: checked for length first, then read by the libraries that know them."""
+"""PLY, GLB and 3MF: checked for length first, then read by the libraries that know them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import numpy as np
 
 from fabfold.errors import ModelError
 from fabfold.solid.raw import RawMesh, head_of, no_faces, what_is_it
-from fabfold.solid.tessellate import tessellate
 
-__all__ = ["read_3mf", "read_glb", "read_ply", "read_step"]
+__all__ = ["read_3mf", "read_glb", "read_ply"]
 
 _PLY_BYTES = {
     "char": 1, "uchar": 1, "int8": 1, "uint8": 1,
@@ -192,64 +191,3 @@ def _collect(resource: Any, place: Any, parts: list[tuple[Any, Any]]) -> None:
             component = resource.GetComponent(index)
             own = _affine(component.GetTransform()) if component.HasTransform() else np.eye(4)
             _collect(component.GetObjectResource(), place @ own, parts)
-
-
-def read_step(path: Path) -> RawMesh:
-    """Read all solids of a STEP file and cut their surfaces into triangles.
-
-    Raises
-    ------
-    ModelError
-        If the file is cut off, cannot be read, or has no solid.
-    """
-    import build123d
-
-    head = head_of(path)
-    if not head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"ISO-10303-21"):
-        raise ModelError(
-            f"{path.name} is not a STEP file but {what_is_it(head)}; export the model as STEP"
-        )
-    size = path.stat().st_size
-    with path.open("rb") as stream:
-        stream.seek(max(0, size - 256))
-        tail = stream.read()
-    if b"END-ISO-10303-21" not in tail:
-        raise ModelError(
-            f"{path.name} is incomplete: a STEP file ends with END-ISO-10303-21, this one was cut "
-            "off; export or download it again"
-        )
-    if not _has_faces(path):
-        raise ModelError(
-            f"{path.name} has no solid in it: only a solid body can be folded; export the part "
-            "itself, not an empty assembly or a sketch"
-        )
-    try:
-        shape = build123d.import_step(path)
-        solids = list(shape.solids())
-        # Closed skins that were not declared solids are as good: the triangles tell.
-        bodies = solids or list(shape.faces())
-        size = build123d.Compound(bodies).bounding_box().size
-        parts = [tessellate(body, max(size.X, size.Y, size.Z)) for body in bodies]
-    except Exception as error:  # the kernel reports bad files by exceptions of many types
-        raise ModelError(
-            f"{path.name} cannot be read as STEP ({type(error).__name__}: {str(error)[:120]}); "
-            "export the model again"
-        ) from error
-    parts = [part for part in parts if len(part[1])]
-    if not parts:
-        raise ModelError(f"{path.name} has no solid in it: only a solid body can be folded")
-    notes = [f"the file has {len(solids)} separate solids"] if len(solids) > 1 else []
-    if not solids:
-        notes.append("the file has surfaces only, no solid; they were taken for its skin")
-    offsets = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
-    return RawMesh(
-        np.concatenate([vertices for vertices, _ in parts]),
-        np.concatenate([part[1] + offset for part, offset in zip(parts, offsets, strict=False)]),
-        tuple(notes),
-    )
-
-
-def _has_faces(path: Path) -> bool:
-    """Whether a STEP file has faces at all; asked first, as the kernel prints what it thinks."""
-    with path.open("rb") as stream:
-        return any(b"FACE" in line.upper() for line in stream)

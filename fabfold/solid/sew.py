@@ -20,7 +20,7 @@ TOLERANCES = (1e-7, 1e-6, 1e-5, 1e-4)
 SPLIT_LIMIT = 20_000
 
 
-def sew(vertices: Points, faces: Faces) -> Faces:
+def sew(vertices: Points, faces: Faces) -> tuple[Faces, float]:
     """Close cracks between neighbouring faces, with the smallest tolerance that closes most.
 
     Parameters
@@ -31,18 +31,20 @@ def sew(vertices: Points, faces: Faces) -> Faces:
 
     Returns
     -------
-    (g, 3) int64 array
+    faces : (g, 3) int64 array
         Over the same vertices; the faces as they were where nothing is gained.
+    tolerance : float
+        The tolerance that was needed, 0 if the faces are as they were.
     """
-    best, fewest = faces, Edges.of(faces).odd
+    best, fewest, needed = faces, Edges.of(faces).odd, 0.0
     for tolerance in TOLERANCES:
         if fewest == 0:
             break
         joined = weld_rims(vertices, faces, tolerance)
         for candidate in (joined, split_rims(vertices, joined, tolerance)):
             if len(candidate) and (odd := Edges.of(candidate).odd) < fewest:
-                best, fewest = candidate, odd
-    return best
+                best, fewest, needed = candidate, odd, tolerance
+    return best, needed
 
 
 def _rim(faces: Faces) -> NDArray[np.bool_]:

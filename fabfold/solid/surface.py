@@ -73,7 +73,10 @@ def close_surface(name: str, vertices: Points, faces: Faces) -> tuple[list[Shell
     notes: list[str] = []
     vertices, faces = weld(vertices, faces)
     if len(faces) and not Edges.of(faces).closed:
-        faces = sew(vertices, faces)
+        faces, gap = sew(vertices, faces)
+        # Less than this is rounding, and not worth a word.
+        if gap > 1e-6:
+            notes.append(f"cracks of up to {gap:.2g} of the model's length were sewn up")
     if len(faces) == 0:
         raise ModelError(f"{name} has no volume: all its triangles are points or lines")
     edges = Edges.of(faces)

@@ -32,6 +32,8 @@ MAX_TRIANGLES = 200_000
 NO_VOLUME = 1e-12
 #: Self-crossings are resolved exactly up to this many triangles; denser meshes are thinned first.
 CROSSING_LIMIT = 50_000
+#: More crossing faces than this, if they are most of the mesh, take the exact way too long.
+TANGLE_LIMIT = 1_000
 #: Crossings that change the volume by less than this share are rounding, and left alone.
 SAME_VOLUME = 1e-6
 
@@ -144,8 +146,11 @@ def _sound(vertices: Points, faces: Faces) -> tuple[manifold3d.Manifold, bool]:
             vertices, faces = to_mesh(body)
         # Where bodies share an edge, Manifold pairs its faces blindly: resolve these exactly.
         tangled = bool(Edges.of(faces).count.max() > 2)
-        if not tangled and not _crosses(vertices, faces):
+        crossing = _crossing(vertices, faces)
+        if not tangled and not crossing:
             return body, False
+        if crossing > max(TANGLE_LIMIT, len(faces) // 2):
+            return to_manifold(*wrap(vertices, faces)), True
         if body.num_tri() > CROSSING_LIMIT:
             vertices, faces = to_mesh(thinned(body, CROSSING_LIMIT))
     try:
@@ -159,11 +164,11 @@ def _sound(vertices: Points, faces: Faces) -> tuple[manifold3d.Manifold, bool]:
     return clear, True
 
 
-def _crosses(vertices: Points, faces: Faces) -> bool:
-    """Whether faces of the mesh that share no vertex cross each other."""
+def _crossing(vertices: Points, faces: Faces) -> int:
+    """Number of faces that cross a face with which they share no vertex."""
     meshes = to_mesh_set(vertices, faces)
     meshes.compute_selection_by_self_intersections_per_face()
-    return bool(meshes.current_mesh().selected_face_number() > 0)
+    return int(meshes.current_mesh().selected_face_number())
 
 
 def _union_with_itself(vertices: Points, faces: Faces) -> tuple[Points, Faces]:

@@ -47,7 +47,7 @@ _SAMPLES = {
         Sample("car", "a chunky little car", "box-3x4x4", 1),
         Sample("duck", "a bath duck", "box-4x4x4", 1),
         Sample("elephant", "an elephant with trunk and tusks", "box-5x5x5", 1),
-        Sample("locomotive", "a small steam locomotive", "box-4x4x5", 1),
+        Sample("locomotive", "a small tank locomotive", "box-4x4x5", 1),
         Sample("rabbit", "a sitting rabbit", "box-4x4x4", 1),
     )
 }
@@ -83,7 +83,7 @@ def build_sample(name: str) -> build123d.Part:
     Returns
     -------
     build123d.Part
-        One valid solid that stands on z = 0 and looks along +x; about 10 mm a voxel.
+        One valid solid that stands on z = 0 and looks along +x.
 
     Raises
     ------

@@ -10,7 +10,7 @@ __all__ = ["draw"]
 
 
 def draw() -> Any:
-    """Draw the duck: 10 mm a voxel, looking along +x."""
+    """Draw the duck: about 13 mm a voxel, looking along +x."""
     from build123d import Box, Pos
 
     body = ellipsoid((-1, 0, 15), (27, 20, 20))

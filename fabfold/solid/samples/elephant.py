@@ -10,7 +10,7 @@ __all__ = ["draw"]
 
 
 def draw() -> Any:
-    """Draw the elephant: 10 mm a voxel, looking along +x."""
+    """Draw the elephant: about 13 mm a voxel, looking along +x."""
     from build123d import Box, Pos
 
     body = ellipsoid((-2, 0, 38), (29, 23, 23), (0, -6, 0))

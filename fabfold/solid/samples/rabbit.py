@@ -10,7 +10,7 @@ __all__ = ["draw"]
 
 
 def draw() -> Any:
-    """Draw the rabbit: 10 mm a voxel, looking along +x."""
+    """Draw the rabbit: about 13 mm a voxel, looking along +x."""
     body = ellipsoid((-3, 0, 21), (22.5, 18, 18), (0, -20, 0))
     chest = ellipsoid((10, 0, 24), (12.5, 12.5, 18), (0, 15, 0))
     head = ellipsoid((17, 0, 45), (15.5, 13, 13), (0, 12, 0))
