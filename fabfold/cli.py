@@ -201,6 +201,58 @@ def list_things(
     show_list(what)
 
 
+@app.command()
+@_guarded
+def coupon(
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Ends in .3mf, .step or .stl.")
+    ] = Path("coupon.3mf"),
+    profile: ProfileName = None,
+    clearances: Annotated[
+        str | None,
+        typer.Option("--clearances", help="In mm, such as 0.2,0.3,0.4. Default: 0.15 to 0.50."),
+    ] = None,
+) -> None:
+    """Make a tolerance coupon: hinges at several clearances, and how to read them."""
+    from fabfold.coupon import make_coupon
+
+    for path in make_coupon(output, profile, clearances):
+        typer.echo(path)
+
+
+@app.command()
+@_guarded
+def calibrate(
+    turns_freely: Annotated[
+        float,
+        typer.Option(
+            "--turns-freely", help="Smallest clearance on the coupon whose hinge turns freely, mm."
+        ),
+    ],
+    profile: ProfileName = None,
+    fuses: Annotated[
+        float | None,
+        typer.Option("--fuses", help="Largest clearance on the coupon whose hinge is fused, mm."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="The new profile. Default: my-PROFILE.toml."),
+    ] = None,
+) -> None:
+    """Write your own printer profile from a printed coupon; 'export --profile FILE' uses it."""
+    from fabfold.printing.calibrate import calibrate as calibrated
+    from fabfold.printing.calibrate import write_profile
+    from fabfold.printing.profiles import DEFAULT_PROFILE, load_profile
+
+    name = "" if output is None else output.stem
+    mine = calibrated(
+        load_profile(profile or DEFAULT_PROFILE), turns_freely, fuses_mm=fuses, name=name
+    )
+    path = output or Path(f"{mine.name}.toml")
+    write_profile(path, mine)
+    typer.echo(f"{path}: clearance {mine.clearance_mm:g} mm; use it with --profile {path}")
+
+
 def _version(value: bool) -> None:
     if value:
         typer.echo(f"fabfold {__version__}")

@@ -19,13 +19,25 @@ from fabfold.tree.solve import Candidate
 from fabfold.voxels.features import features
 from fabfold.voxels.model import Voxels
 
-__all__ = ["SEEDS_PER_ROUND", "Rounds"]
+__all__ = ["Rounds"]
 
-#: Seeds in one round; a constant, so that results do not depend on the workers.
+#: Seeds in one round; constants, so that results do not depend on the workers.
 SEEDS_PER_ROUND = 4
+SEEDS_PER_LARGE_ROUND = 2
+#: Templates of more cells are large: a search takes minutes, and a full template seldom folds.
+LARGE = 72
+#: Share of a large template that a voxelization leaves free to be searched first.
+ROOM = 0.06
 #: Distance of the search's first seeds for recipe seeds that follow each other: more than
 #: any recipe's rounds use, so that two recipes share none.
 SEED_STRIDE = 10_000
+
+
+def _in_order(options: Sequence[Voxels], cells: int) -> list[Voxels]:
+    """Order of search: best first, but those that leave a large template some room before."""
+    if cells <= LARGE:
+        return list(options)
+    return sorted(options, key=lambda voxels: len(voxels) > (1.0 - ROOM) * cells)
 
 
 class Rounds:
@@ -36,7 +48,8 @@ class Rounds:
     recipe : Recipe
     template : Template
     options : sequence of Voxels
-        Voxelizations, best first; round ``i`` searches option ``i`` modulo their number.
+        Voxelizations, best first; each round searches the next one, with those first that
+        leave a large template some room.
     key : str
         Digest of all that `options` depend on.
     store : StageStore
@@ -58,12 +71,17 @@ class Rounds:
     ) -> None:
         self.recipe = recipe
         self.template = template
-        self.options = options
+        self.options = _in_order(options, len(template))
         self.workers = workers
         self._key = key
         self._store = store
         self._listening = listening
         self._done: dict[int, list[Candidate]] = {}
+
+    @property
+    def seeds_per_round(self) -> int:
+        """Seeds that one round searches."""
+        return SEEDS_PER_LARGE_ROUND if len(self.template) > LARGE else SEEDS_PER_ROUND
 
     def found(self) -> Iterator[tuple[Voxels, list[Candidate]]]:
         """Rounds that found trees that fold, with the voxelization that they join.
@@ -92,7 +110,7 @@ class Rounds:
             raise NoTreeError(why)
         if not found:
             raise NoFoldError(
-                f"no tree that folds in {self.recipe.rounds} rounds of {SEEDS_PER_ROUND} seeds; "
+                f"no tree that folds in {self.recipe.rounds} rounds of {self.seeds_per_round} seeds; "
                 "try --effort thorough, more --rounds, another --seed or a larger template"
             )
 
@@ -100,8 +118,9 @@ class Rounds:
         if number in self._done:
             return self._done[number]
         recipe = self.recipe
-        first = recipe.seed * SEED_STRIDE + number * SEEDS_PER_ROUND
-        seeds = range(first, first + SEEDS_PER_ROUND)
+        count = self.seeds_per_round
+        first = recipe.seed * SEED_STRIDE + number * count
+        seeds = range(first, first + count)
         weights = Weights(surface=recipe.surface_weight, single=recipe.single_weight)
         about = [recipe.surface_weight, recipe.single_weight, recipe.effort, number]
         keys = {seed: stage_key(self._key, *about, seed) for seed in seeds}

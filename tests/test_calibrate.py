@@ -1,0 +1,47 @@
+import pytest
+from typer.testing import CliRunner
+
+from fabfold.cli import app
+from fabfold.errors import RecipeError
+from fabfold.printing.calibrate import calibrate, write_profile
+from fabfold.printing.profiles import load_profile
+
+
+def test_a_calibrated_profile_survives_its_file(tmp_path):
+    shipped = load_profile("fdm-pla-0.4")
+    mine = calibrate(shipped, 0.3, fuses_mm=0.2, name="garage")
+    assert (mine.clearance_mm, mine.min_gap_mm) == (0.3, 0.25)
+    assert mine.min_wall_mm == shipped.min_wall_mm
+    assert "0.3 mm turns freely" in mine.sources[0]
+    path = tmp_path / "garage.toml"
+    write_profile(path, mine)
+    assert load_profile(str(path)) == mine
+
+
+def test_without_the_fused_one_the_share_of_the_gap_is_kept():
+    shipped = load_profile("mjf-pa12")
+    mine = calibrate(shipped, 0.25)
+    share = shipped.min_gap_mm / shipped.clearance_mm
+    assert mine.min_gap_mm == pytest.approx(0.25 * share)
+    assert mine.name == "my-mjf-pa12"
+
+
+@pytest.mark.parametrize(("turns", "fuses"), [(0.0, None), (-1, None), (0.3, 0.3), (0.3, 0.4)])
+def test_figures_that_contradict_are_refused(turns, fuses):
+    with pytest.raises(RecipeError, match="--"):
+        calibrate(load_profile("fdm-pla-0.4"), turns, fuses_mm=fuses)
+
+
+def test_the_commands_write_coupon_and_profile(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run = CliRunner().invoke
+    done = run(app, ["calibrate", "--turns-freely", "0.30", "--profile", "fdm-pla-0.4"])
+    assert done.exit_code == 0, done.output
+    assert load_profile("my-fdm-pla-0.4.toml").clearance_mm == 0.3
+    done = run(app, ["coupon", "--profile", "fdm-pla-0.4", "-o", "coupon.stl"])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "coupon.stl").stat().st_size > 84
+    done = run(app, ["coupon", "-o", "coupon.xyz"])
+    assert done.exit_code == 2
+    done = run(app, ["coupon", "--clearances", "0.2,x", "-o", "coupon.stl"])
+    assert done.exit_code == 2
