@@ -110,8 +110,8 @@ class Rounds:
             raise NoTreeError(why)
         if not found:
             raise NoFoldError(
-                f"no tree that folds in {self.recipe.rounds} rounds of {self.seeds_per_round} seeds; "
-                "try --effort thorough, more --rounds, another --seed or a larger template"
+                f"no tree that folds in {self.recipe.rounds} rounds of {self.seeds_per_round} "
+                "seeds; try --effort thorough, more --rounds, another --seed or a larger template"
             )
 
     def _round(self, number: int, voxels: Voxels) -> list[Candidate]:
