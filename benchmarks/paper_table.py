@@ -71,7 +71,9 @@ def run_one(source: str, template: str, kit_folder: Path) -> dict[str, Any]:
         kit.export()
         row["checks_failed"] = [check.name for check in kit.check() if not check.ok]
         row["exit"] = int(bool(row["checks_failed"]))
-        row["summary"] = json.loads((kit_folder / "report.json").read_text())["summary"]
+        row["summary"] = json.loads((kit_folder / "report.json").read_text(encoding="utf-8"))[
+            "summary"
+        ]
     except FabfoldError as error:
         row["exit"], row["error"] = error.exit_code, str(error)
     row["total"] = time.perf_counter() - start
@@ -148,7 +150,7 @@ def main() -> None:
     jobs = {n: (str(options.models / m[0]), m[1]) for n, m in MODELS.items()}
     jobs |= {f"sample:{n}": (f"sample:{n}", sample(n).template) for n in sample_names()}
     memory = HERE / "paper_table.json"
-    rows = json.loads(memory.read_text()) if memory.is_file() else {}
+    rows = json.loads(memory.read_text(encoding="utf-8")) if memory.is_file() else {}
     for name in options.names or jobs:
         source, template = jobs[name]
         kit = options.kits / name.replace(":", "-")
@@ -159,7 +161,7 @@ def main() -> None:
             sys.exit(f"{name}: {done.stderr}")
         row = json.loads(done.stdout.splitlines()[-1])
         if "summary" in row:
-            motion = json.loads((kit / "motion.json").read_text())
+            motion = json.loads((kit / "motion.json").read_text(encoding="utf-8"))
             row["gap"] = motion["certificate"]["min_gap_mm"]
             if options.verify.is_file():
                 verdict = subprocess.run(
@@ -175,8 +177,8 @@ def main() -> None:
             f"{name}: exit {row['exit']}, {row['total']:.1f} s", row.get("verify", ""), flush=True
         )
         ordered = {key: rows[key] for key in jobs if key in rows}
-        memory.write_text(json.dumps(ordered, indent=1) + "\n")
-        (HERE / "paper_table.md").write_text(table(ordered))
+        memory.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
+        (HERE / "paper_table.md").write_text(table(ordered), encoding="utf-8")
 
 
 if __name__ == "__main__":
