@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import zipfile
 import zlib
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from fabfold.errors import KitError
-from fabfold.files import write_bytes
+from fabfold.files import write_npz
 from fabfold.voxels.model import SUBDIVISION, Voxels
 
 __all__ = ["load_voxels", "save_voxels"]
@@ -56,15 +55,7 @@ def save_voxels(path: Path, voxels: Voxels) -> None:
         "energy_names": np.array(names, dtype=np.str_),
         "energy_values": np.array([voxels.energy[name] for name in names], dtype=np.float64),
     }
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, array in arrays.items():
-            member = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
-            member.compress_type = zipfile.ZIP_DEFLATED
-            content = io.BytesIO()
-            np.lib.format.write_array(content, np.asarray(array, order="C"), allow_pickle=False)
-            archive.writestr(member, content.getvalue())
-    write_bytes(Path(path), buffer.getvalue())
+    write_npz(Path(path), arrays)
 
 
 def load_voxels(path: Path) -> Voxels:
