@@ -156,7 +156,7 @@ def main() -> None:
         kit = options.kits / name.replace(":", "-")
         shutil.rmtree(kit, ignore_errors=True)
         command = [sys.executable, __file__, "--one", source, template, str(kit)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
         if done.returncode:
             sys.exit(f"{name}: {done.stderr}")
         row = json.loads(done.stdout.splitlines()[-1])
@@ -167,7 +167,7 @@ def main() -> None:
                 verdict = subprocess.run(
                     [sys.executable, str(options.verify), str(kit), "--cad"],
                     capture_output=True,
-                    text=True,
+                    encoding="utf-8",
                     check=False,
                 )
                 bad = [line for line in verdict.stdout.splitlines() if line.startswith("FAIL")]

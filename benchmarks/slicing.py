@@ -26,7 +26,7 @@ def slice_kit(kit: Path) -> bool:
             "--fill-density", "5%", "--output", str(gcode), str(model),
         ]  # fmt: skip
         start = time.perf_counter()
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
         size = gcode.stat().st_size if gcode.is_file() else 0
         seconds = time.perf_counter() - start
         good = done.returncode == 0 and size > 0

@@ -22,7 +22,7 @@ def fabfold(*arguments, cwd=None):
     return subprocess.run(
         [sys.executable, "-m", "fabfold", *map(str, arguments)],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         cwd=cwd,
         check=False,
     )
@@ -37,7 +37,9 @@ def test_help_imports_no_cad_package():
         f"loaded = sorted(set(sys.modules) & set({HEAVY!r}))\n"
         "print('LOADED', loaded, file=sys.stderr)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True
+    )
     assert "export" in done.stdout
     assert "LOADED []" in done.stderr
 

@@ -184,6 +184,6 @@ def test_another_process_draws_the_same_bytes():
         [sys.executable, "-c", _DRAW, str(Path(__file__).parent)],
         check=True,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
     ).stdout.strip()
     assert found == hashlib.sha256(png_bytes(picture_of_solid(solid(), SMALL))).hexdigest()

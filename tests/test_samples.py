@@ -13,6 +13,7 @@ from fabfold.lattice import load_template
 from fabfold.solid.load import load_solid
 from fabfold.solid.model import Solid
 from fabfold.solid.samples import build_sample, sample, sample_names, solid_of
+from fabfold.voxels.scan import occupancy
 
 
 @functools.cache
@@ -79,10 +80,14 @@ def test_is_chunky_enough_for_its_box(name: str) -> None:
     pitch = (result.volume / (0.5 * cells)) ** (1 / 3)
     longest = np.ptp(result.bounds, axis=0).max()
     assert 4.5 < longest / pitch < 8.5
-    points = np.random.default_rng(0).uniform(*result.bounds, (20_000, 3))
-    inside = points[result.to_trimesh().contains(points)]
-    middle = result.bounds.mean(axis=0)
-    touched = len(np.unique(np.floor((inside - middle) / pitch + 0.5), axis=0))
+    fine = 10
+    reach = np.ceil(np.ptp(result.bounds, axis=0) / pitch / 2 + 0.5).astype(int)
+    corner = result.bounds.mean(axis=0) - (reach + 0.5) * pitch
+    count = 2 * reach + 1
+    x, y, z = (fine * count).tolist()
+    inside = occupancy((result.vertices - corner) * fine / pitch, result.faces, (x, y, z))
+    cubes = inside.reshape(count[0], fine, count[1], fine, count[2], fine)
+    touched = int((cubes.mean(axis=(1, 3, 5)) > 0.02).sum())
     assert touched < 1.6 * cells
 
 

@@ -39,7 +39,7 @@ def read_step(path: Path) -> RawMesh:
             [sys.executable, "-m", "fabfold.solid.read_step", str(path.resolve()), str(result)],
             env={**os.environ, "PYTHONPATH": search},
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             errors="replace",
             check=False,
         )

@@ -58,7 +58,9 @@ def test_it_stands_on_its_own():
 
 def test_import_is_light():
     code = "import hinges, sys; print([m for m in ('build123d','OCP','scipy') if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True
+    )
     assert done.stdout.strip() == "[]"
 
 
