@@ -134,7 +134,13 @@ def test_interrupt_leaves_what_is_done_and_goes_on(bar, tmp_path):
     command = [sys.executable, "-m", "fabfold", "export", str(bar), "-o", str(folder)]
     for key, value in OPTIONS.items():
         command += [f"--{key}", str(value)]
-    run = subprocess.Popen(command, stderr=subprocess.PIPE, encoding="utf-8")
+    # A shell's background job ignores SIGINT, and so would its children.
+    run = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     journal = folder / "stages" / "journal.json"
     deadline = time.monotonic() + 400
     while not (journal.is_file() and "voxelize" in journal.read_text(encoding="utf-8")):
