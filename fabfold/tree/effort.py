@@ -37,8 +37,6 @@ class Effort:
         Planner expansions without progress for a first score.
     look : int
         The same, where the first score leaves little to do.
-    patience : int
-        Candidates without progress after which the part that interlocks is sought out.
     near : float
         Share of unresolved planner levels that still counts as little.
     keep : int
@@ -47,25 +45,24 @@ class Effort:
 
     beam: int = 10
     roots: int = 100
-    restarts: int = 60
+    restarts: int = 30
     removals: int = 30000
     closing: int = 20
-    looking: int = 1
+    looking: int = 3
     polishing: int = 2500
     least: int = 4
     most: int = 16
     rebeam: int = 6
     trees: int = 3
     glance: int = 40
-    look: int = 150
-    patience: int = 30
+    look: int = 2500
     near: float = 0.06
     keep: int = 5
 
 
 #: Effort by name, as the command line offers it.
 EFFORTS: dict[str, Effort] = {
-    "quick": Effort(restarts=20, polishing=300),
+    "quick": Effort(restarts=10, polishing=300),
     "normal": Effort(),
     "thorough": Effort(restarts=100, polishing=10000),
 }

@@ -15,13 +15,11 @@ from fabfold.tree.build import HingeChoice, SpanningTree, fold_tree, hinge_choic
 from fabfold.tree.effort import Effort
 from fabfold.tree.foldability import Foldability
 from fabfold.tree.grow import energy_of, fill_beam
-from fabfold.tree.interlock import interlock
 from fabfold.tree.model import FoldTree
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.rebuild import loose_pieces
 from fabfold.tree.rng import generator
 from fabfold.tree.ruin import propose, repair
-from fabfold.tree.system import HingeSystem
 from fabfold.tree.wedge import hinge_tables
 
 __all__ = ["Candidate", "Statistics", "grow", "solve"]
@@ -61,7 +59,6 @@ class Statistics:
     closed: int = 0
     glances: int = 0
     looks: int = 0
-    interlocks: int = 0
     starts: int = 0
     folded: int = 0
     log: list[str] = field(default_factory=list)
@@ -91,6 +88,7 @@ class _Scale:
     hot: float
     cold: float
     focus: float = 0.5
+    loose: float = 10.0
 
 
 def _scale(voxels: int) -> _Scale:
@@ -272,22 +270,6 @@ class _Search:
             return None
         return best
 
-    def narrowed(self, state: _State) -> _State:
-        """The same state with removals aimed at a part of it that is locked in itself."""
-        assert state.tree is not None
-        system = state.tree.system
-
-        def stuck(some: HingeSystem) -> bool:
-            return bool(self.judge.stuck_hinges(some).any())
-
-        def unfolded(some: HingeSystem) -> bool:
-            return bool(self.judge.remaining(some, self.effort.glance).any())
-
-        self.statistics.interlocks += 1
-        hinges = interlock(system, stuck if stuck(system) else unfolded, self.rng)
-        focus = np.unique(state.tree.joints[hinges, :2]).astype(np.int32)
-        return replace(state, focus=focus)
-
     # --- phases ----------------------------------------------------------------------------
 
     def fold(self, start: _State) -> _State | None:
@@ -298,7 +280,7 @@ class _Search:
             return None
         # Closing (no hinge stuck for good) costs little a step; looks at the planner cost much.
         closing, looking = self.effort.closing * count, self.effort.looking * count
-        glances = step = idle = 0
+        glances = step = 0
         while step < closing and glances < looking:
             if now.penalty == 0:
                 return now
@@ -320,14 +302,8 @@ class _Search:
             looked = self.statistics.glances - before
             glances += looked
             step += looked == 0
-            idle += max(looked, 1)
             if fresh is not None:
-                if fresh.penalty < now.penalty:
-                    idle = 0
                 now = fresh
-            if idle >= self.effort.patience and now.penalty > 0:
-                idle = 0
-                now = self.narrowed(now)
         return now if now.penalty == 0 else None
 
     def polish(self, start: _State) -> None:
