@@ -46,8 +46,8 @@ _SAMPLES = {
     for sample in (
         Sample("car", "a chunky little car", "box-3x4x4", 1),
         Sample("duck", "a bath duck", "box-4x4x4", 1),
-        Sample("elephant", "an elephant with trunk and tusks", "box-5x5x5", 1),
-        Sample("locomotive", "a small tank locomotive", "box-4x4x5", 1),
+        Sample("elephant", "an elephant with trunk and tusks", "box-4x4x4", 1),
+        Sample("locomotive", "a small tank locomotive", "box-4x4x4", 1),
         Sample("rabbit", "a sitting rabbit", "box-4x4x4", 1),
     )
 }
