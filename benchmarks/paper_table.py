@@ -93,7 +93,8 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         "",
         "Written by `python benchmarks/paper_table.py` on 2 cores, one run each with the defaults",
         "of `fabfold export` (single hinges, seed 1). Joints in brackets are the paper's. *verify*",
-        "is an independent checker of the kit folder, where it is at hand.",
+        "is an independent checker of the kit folder, where it is at hand. Seconds are of the",
+        "clock, whatever else the machine was doing.",
         "",
         "| model | template | voxels | joints (paper) | surface | count | total | moves |"
         " carved cells | struts | gap mm | exit | verify |",
