@@ -184,7 +184,7 @@ def _stage(name: str, summary: str) -> None:
 
 _stage("voxelize", "Cut the model into voxels.")
 _stage("fit", "Find joint trees that carry the voxels into the template and fold.")
-_stage("fold", "Certify a folding path of the best tree on the lattice.")
+_stage("fold", "Find the folding path of the best tree on the lattice.")
 _stage("join", "Cut the printed bodies with their hinges, and certify the path on them.")
 _stage("check", "Check the printed bodies and replay the folding.")
 _stage("export", "Make the whole kit: 3MF, STEP, STL, animation and report.")

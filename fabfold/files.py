@@ -16,7 +16,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["replacing", "sha256_of", "write_bytes", "write_json", "write_npz", "write_text"]
+__all__ = [
+    "data_folder",
+    "replacing",
+    "sha256_of",
+    "write_bytes",
+    "write_json",
+    "write_npz",
+    "write_text",
+]
+
+
+def data_folder(name: str) -> Path:
+    """Folder of shipped data such as ``templates``, in a checkout as in an installed wheel."""
+    package = Path(__file__).resolve().parent
+    installed = package / "_data" / name
+    return installed if installed.is_dir() else package.parent / name
 
 
 @contextmanager

@@ -167,7 +167,7 @@ class Kit:
         return candidates
 
     def fold(self) -> Attempt:
-        """Best tree with its folding path, certified for ideal cubes (paper section 5)."""
+        """Best tree with its folding path, planned on the lattice (paper section 5)."""
         result = self._results.get("fold")
         if result is None:
             result = next(self._attempts())

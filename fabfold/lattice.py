@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import TemplateError
+from fabfold.files import data_folder
 
 __all__ = [
     "FACES",
@@ -172,9 +173,7 @@ _BOX = re.compile(r"box-(\d+)x(\d+)x(\d+)")
 
 def templates_folder() -> Path:
     """Folder that holds the template files, in a checkout as in an installed wheel."""
-    here = Path(__file__).resolve().parent
-    installed = here / "_data" / "templates"
-    return installed if installed.is_dir() else here.parent / "templates"
+    return data_folder("templates")
 
 
 def template_names() -> list[str]:

@@ -9,6 +9,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from fabfold.errors import RecipeError
+from fabfold.files import data_folder
 
 __all__ = ["DEFAULT_PROFILE", "Profile", "load_profile", "profile_names", "profiles_folder"]
 
@@ -77,9 +78,7 @@ class Profile(BaseModel):
 
 def profiles_folder() -> Path:
     """Folder that holds the profile files, in a checkout as in an installed wheel."""
-    package = Path(__file__).resolve().parent.parent
-    installed = package / "_data" / "prints"
-    return installed if installed.is_dir() else package.parent / "prints"
+    return data_folder("prints")
 
 
 def profile_names() -> list[str]:
