@@ -5,12 +5,12 @@ from __future__ import annotations
 import networkx
 import numpy as np
 import pytest
-from tree_cases import animal, solid_problem, strip
+from tree_cases import animal, face_pairs, solid_problem, strip
 
-from fabfold.lattice import FACES, ROTATIONS, parity
+from fabfold.lattice import FACES, ROTATIONS, load_template, parity
 from fabfold.tree.build import hinge_choice
 from fabfold.tree.grow import clusters, energy_of
-from fabfold.tree.problem import joint_table
+from fabfold.tree.problem import joint_table, tree_problem
 from fabfold.tree.rebuild import apart
 from fabfold.tree.rng import generator, random_below, random_bits, random_float
 from fabfold.tree.ruin import propose
@@ -104,38 +104,59 @@ def test_clusters_and_energy(grown):
         for piece in pieces:
             assert len(set(label[list(piece)].tolist())) == 1
 
-        cells, turns = placed(problem, pose)
-        inside = {tuple(c) for c in problem.template.cells.tolist()}
-        taken = {tuple(c): i for i, c in enumerate(cells.tolist())}
-        depth_of = {}
-        surface = problem.tables.surface
-        total = 0.0
-        for cell in inside:
-            bits = 0
-            for f in range(6):
-                if tuple((np.array(cell) + FACES[f]).tolist()) not in inside:
-                    bits |= 1 << f
-            if cell not in taken:
-                total += 0.3 * bin(bits).count("1")
-                continue
-            i = taken[cell]
-            for f in range(6):
-                if bits >> f & 1:
-                    # The face of the voxel, in A, that looks out of face f in B.
-                    own = int(np.flatnonzero((turns[i].T @ FACES[f] == FACES).all(axis=1))[0])
-                    depth_of[i, own] = float(surface[i, 0, 1 << own])
-                    total += depth_of[i, own]
+        total = float(sum(problem.tables.cost[v, q] for v, q in enumerate(pose.tolist())))
+        for cell in set(range(len(problem.template))) - set((pose // 24).tolist()):
+            total += 0.3 * int((problem.tables.around[cell] < 0).sum())
         energy, number = energy_of(problem.tables, pose, problem.empty_face)
         assert number == found
         assert energy == pytest.approx(total + 0.1 * (found - 1), abs=1e-4)
 
 
-def test_surface_table_is_the_weighted_depth():
+def test_cost_is_the_weighted_depth_of_the_faces_that_show():
     rng = np.random.default_rng(4)
     depth = rng.random((4, 6))
     problem = solid_problem(strip(4), "box-2x2x1", depth=depth)
-    for f in range(6):
-        assert problem.tables.surface[:, 0, 1 << f] == pytest.approx(0.3 * depth[:, f], abs=1e-6)
+    inside = {tuple(c) for c in problem.template.cells.tolist()}
+    for cell, at in enumerate(problem.template.cells):
+        shown = [f for f in range(6) if tuple((at + FACES[f]).tolist()) not in inside]
+        for r in range(24):
+            for v in range(4):
+                wanted = 0.0
+                for f in shown:
+                    # The face of the voxel, in A, that looks out of face f in B.
+                    own = int(np.flatnonzero((ROTATIONS[r].T @ FACES[f] == FACES).all(axis=1))[0])
+                    wanted += 0.3 * depth[v, own]
+                assert problem.tables.cost[v, 24 * cell + r] == pytest.approx(wanted, abs=1e-6)
+
+
+def test_bias_is_added_and_stiff_pairs_stay_whole():
+    cells = strip(8)
+    pairs = face_pairs(cells)
+    template = load_template("box-2x2x2")
+    bias = np.zeros((8, 24 * len(template)))
+    bias[3, 5] = 7.0
+    stiff = np.zeros(len(pairs), dtype=bool)
+    stiff[3] = True
+    problem = tree_problem(
+        np.array(cells),
+        template,
+        pairs=pairs,
+        rigid=np.ones(len(pairs), dtype=bool),
+        hinge=np.ones((len(pairs), 4), dtype=bool),
+        depth=np.zeros((8, 6)),
+        bias=bias,
+        stiff=stiff,
+    )
+    assert problem.tables.cost[3, 5] == pytest.approx(7.0)
+    i, j = pairs[3].tolist()
+    face = int(np.flatnonzero((problem.source[j] - problem.source[i] == FACES).all(axis=1))[0])
+    found = 0
+    for pose in grow(problem, 1):
+        assert problem.tables.step[face, 0, pose[i]] == pose[j]
+        found += 1
+        if found == 5:
+            break
+    assert found == 5
 
 
 def test_joint_table_against_matrices():

@@ -49,9 +49,14 @@ def clusters(tables: Tables, pose: NDArray[np.int32], label: NDArray[np.int32]) 
 
 
 @njit(cache=True)
-def surface_of(tables: Tables, v: int, q: int) -> float:
-    """Weighted surface energy of voxel `v` at pose `q`, less that of the empty faces there."""
-    return np.float64(tables.surface[v, q % 24, tables.exposed[q // 24]])
+def keeps_whole(tables: Tables, pose: NDArray[np.int32], v: int, q: int) -> bool:
+    """Whether voxel `v` at pose `q` stays rigid with the placed voxels it must not be cut from."""
+    for f in range(6):
+        if tables.stiff[v, f]:
+            parent = pose[tables.neighbour[v, f]]
+            if parent >= 0 and tables.step[f ^ 1, 0, parent] != q:
+                return False
+    return True
 
 
 @njit(cache=True)
@@ -69,7 +74,7 @@ def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tup
     total = tables.weight[1] * (found - 1)
     for v in range(len(pose)):
         if pose[v] >= 0:
-            total += surface_of(tables, v, pose[v])
+            total += np.float64(tables.cost[v, pose[v]])
             taken[pose[v] // 24] = True
     for cell in range(len(taken)):
         if not taken[cell]:
@@ -100,6 +105,7 @@ def _survey(
     """
     best = -1
     best_key = 1e18
+    whole = len(tables.stiff) > 0
     left = 0
     seeds = 0
     stamp[1] += 1
@@ -129,6 +135,8 @@ def _survey(
                 if q < 0 or taken[q // 24] or mark[q] == stamp[0]:
                     continue
                 mark[q] = stamp[0]
+                if whole and not keeps_whole(tables, pose, v, q):
+                    continue
                 found += 1
                 if flood and reach[q // 24] != stamp[1]:
                     reach[q // 24] = stamp[1]
@@ -233,6 +241,7 @@ def fill_beam(
     count = len(start)
     room = len(tables.cells)
     joints = tables.step.shape[1]
+    whole = len(tables.stiff) > 0
     pose = np.empty((2, width, count), np.int32)
     label = np.empty((2, width, count), np.int32)
     taken = np.zeros((2, width, room), np.bool_)
@@ -289,10 +298,11 @@ def fill_beam(
                     if q < 0 or taken[now, b, q // 24] or mark[q] == stamp[0]:
                         continue
                     mark[q] = stamp[0]
+                    if whole and not keeps_whole(tables, here, v, q):
+                        continue
                     merged = _merged(tables, here, label[now, b], v, q, joined)
-                    pattern = tables.exposed[q // 24]
-                    delta = np.float64(tables.surface[v, q % 24, pattern])
-                    delta -= np.float64(tables.centre[v, pattern])
+                    delta = np.float64(tables.cost[v, q])
+                    delta -= np.float64(tables.centre[v, q // 24])
                     delta += joint_share * tables.weight[1] * (1 - merged)
                     from_state[options] = b
                     to_pose[options] = q

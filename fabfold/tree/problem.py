@@ -45,10 +45,15 @@ class Tables(NamedTuple):
         Pose of the child from the face, the joint and the parent's pose; -1 outside the template.
     weight : (J,) float64 array
         Energy of each joint type.
-    surface : (n, 24, 64) float32 array
-        Weighted Eq. 8 of a voxel by its rotation and the exposed faces (bits) of its cell.
-    centre : (n, 64) float32 array
-        Expected `surface`, subtracted while states of unlike cells are compared.
+    cost : (n, 24 m) float32 array
+        Weighted energy of each voxel at each pose: Eq. 8 of the faces that the box shows, and
+        whatever else was asked for (see `bias` of :func:`tree_problem`).
+    centre : (n, m) float32 array
+        Expected `cost` of each voxel in each cell, subtracted while states of unlike cells are
+        compared.
+    stiff : (n, 6) bool array
+        Pairs that no cut may part: both voxels must keep their relative pose. No rows where
+        there is no such pair.
     exposed : (m,) uint8 array
         Bit ``f`` set where the template ends at face ``f`` of a cell.
     around : (m, 6) int32 array
@@ -62,8 +67,9 @@ class Tables(NamedTuple):
     allowed: NDArray[np.bool_]
     step: NDArray[np.int32]
     weight: NDArray[np.float64]
-    surface: NDArray[np.float32]
+    cost: NDArray[np.float32]
     centre: NDArray[np.float32]
+    stiff: NDArray[np.bool_]
     exposed: NDArray[np.uint8]
     around: NDArray[np.int32]
     source: NDArray[np.int32]
@@ -160,22 +166,27 @@ def joint_table(
     return step, np.ascontiguousarray(around), exposed
 
 
-def _surface_table(
-    depth: NDArray[np.float64], exposed: NDArray[np.uint8], weight: float
+def _cost_table(
+    depth: NDArray[np.float64],
+    exposed: NDArray[np.uint8],
+    weight: float,
+    bias: NDArray[np.floating] | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     # Face f of the cell in B is face turned[r, f] of the voxel in A.
     turned = np.array(
         [[int(np.flatnonzero((d @ r == FACES).all(axis=1))[0]) for d in FACES] for r in ROTATIONS]
     )
-    bits = (np.arange(64)[:, None] >> np.arange(6)) & 1
+    bits = (exposed[:, None] >> np.arange(6)) & 1
     by_face = np.asarray(depth, dtype=float)[:, turned]
-    surface = weight * np.einsum("nrf,pf->nrp", by_face, bits)
-    by_pattern = surface.mean(axis=1)
-    pattern_mean = by_pattern.mean(axis=0)
-    voxel_mean = (by_pattern - pattern_mean)[:, exposed].mean(axis=1)
-    centre = pattern_mean[None, :] + voxel_mean[:, None]
+    cost = weight * np.einsum("nrf,mf->nmr", by_face, bits)
+    if bias is not None:
+        cost += np.asarray(bias, dtype=float).reshape(cost.shape)
+    by_cell = cost.mean(axis=2)
+    cell_mean = by_cell.mean(axis=0)
+    voxel_mean = (by_cell - cell_mean).mean(axis=1)
+    centre = cell_mean[None, :] + voxel_mean[:, None]
     return (
-        np.ascontiguousarray(surface, dtype=np.float32),
+        np.ascontiguousarray(cost.reshape(len(cost), -1), dtype=np.float32),
         np.ascontiguousarray(centre, dtype=np.float32),
     )
 
@@ -190,6 +201,8 @@ def tree_problem(
     depth: NDArray[np.float64],
     fill: NDArray[np.float64] | None = None,
     weights: Weights | None = None,
+    bias: NDArray[np.floating] | None = None,
+    stiff: NDArray[np.bool_] | None = None,
 ) -> TreeProblem:
     """Problem from plain arrays; :func:`from_features` takes the voxel stage's results.
 
@@ -210,6 +223,10 @@ def tree_problem(
     fill : (n,) float array, optional
         Share of each cell that is material.
     weights : Weights, optional
+    bias : (n, 24 m) float array, optional
+        Energy added for a voxel at a pose, on top of the surface's.
+    stiff : (k,) bool array, optional
+        Pairs that no cut may part; `rigid` must hold for them.
 
     Raises
     ------
@@ -232,23 +249,30 @@ def tree_problem(
     step, around, exposed = joint_table(template, joints)
     neighbour = np.full((count, 6), -1, dtype=np.int32)
     allowed = np.zeros((count, 6, len(joints)), dtype=bool)
-    for (i, j), stiff, edges in zip(pairs, rigid, hinge, strict=True):
+    for (i, j), solid, edges in zip(pairs, rigid, hinge, strict=True):
         face = int(np.flatnonzero((cells[j] - cells[i] == FACES).all(axis=1))[0])
         # Both faces list the same edges in the same order, so one row serves either parent.
         for parent, child, side in ((i, j, face), (j, i, face ^ 1)):
-            allowed[parent, side, 0] = stiff
+            allowed[parent, side, 0] = solid
             allowed[parent, side, 1:5] = edges
             if allowed[parent, side].any():
                 neighbour[parent, side] = child
     _require_connected(neighbour)
-    surface, centre = _surface_table(depth, exposed, weights.surface)
+    cost, centre = _cost_table(depth, exposed, weights.surface, bias)
+    whole = np.zeros((count, 6), dtype=bool)
+    if stiff is not None and np.any(stiff):
+        for i, j in np.asarray(pairs)[np.asarray(stiff, dtype=bool)].tolist():
+            face = int(np.flatnonzero((cells[j] - cells[i] == FACES).all(axis=1))[0])
+            whole[i, face] = whole[j, face ^ 1] = True
+            allowed[i, face, 1:] = allowed[j, face ^ 1, 1:] = False
     tables = Tables(
         neighbour=neighbour,
         allowed=allowed,
         step=step,
         weight=np.array([weights.rigid, *([weights.single] * 4)]),
-        surface=surface,
+        cost=cost,
         centre=centre,
+        stiff=whole if whole.any() else whole[:0],
         exposed=exposed,
         around=around,
         source=cells,

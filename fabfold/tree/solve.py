@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -159,12 +159,16 @@ class _Search:
         foldability: Foldability,
         effort: Effort,
         statistics: Statistics,
+        report: Callable[[Candidate], None] | None = None,
+        stop: Callable[[], bool] | None = None,
     ) -> None:
         self.problem = problem
         self.seed = seed
         self.judge = foldability
         self.effort = effort
         self.statistics = statistics
+        self.report = report
+        self.stopped = stop or (lambda: False)
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
         self.generator = generator(int(self.rng.integers(2**62)))
         self.scale = _scale(len(problem))
@@ -281,7 +285,7 @@ class _Search:
         # Closing (no hinge stuck for good) costs little a step; looks at the planner cost much.
         closing, looking = self.effort.closing * count, self.effort.looking * count
         glances = step = 0
-        while step < closing and glances < looking:
+        while step < closing and glances < looking and not self.stopped():
             if now.penalty == 0:
                 return now
             done = max(step / closing, glances / looking)
@@ -311,10 +315,12 @@ class _Search:
         self.tables = self.problem.tables
         energy, _ = energy_of(self.tables, start.pose, self.problem.empty_face)
         now = replace(start, energy=energy)
-        self.results.append(now)
+        self.keep(now)
         best = now.energy
         steps = self.effort.polishing
         for step in range(steps):
+            if self.stopped():
+                break
             heat = 0.1 * (0.005 / 0.1) ** (step / steps)
             value = now.energy + heat * self.rng.exponential()
             found = self.neighbour(now.pose, value, 20, 10.0)
@@ -328,7 +334,23 @@ class _Search:
             self.statistics.folded += 1
             if now.energy < best + 0.1:
                 best = min(best, now.energy)
-                self.results.append(now)
+                self.keep(now)
+
+    def keep(self, state: _State) -> None:
+        """Remember a state that folds; tell of it where it is the best so far."""
+        if self.report is not None and all(state.energy < other.energy for other in self.results):
+            candidate = self.candidate(state)
+            if candidate is not None:
+                self.report(candidate)
+        self.results.append(state)
+
+    def candidate(self, state: _State) -> Candidate | None:
+        """The tree and path of a state; None where the long path search fails."""
+        assert state.tree is not None
+        path = self.judge.path(state.tree.system)
+        if path is None:
+            return None
+        return Candidate(fold_tree(self.problem, state.pose, state.tree), path, self.seed)
 
     def run(self) -> list[Candidate]:
         """All the phases."""
@@ -344,7 +366,7 @@ class _Search:
             if folded is not None:
                 self.polish(folded)
                 break
-            if self.statistics.starts >= effort.restarts:
+            if self.statistics.starts >= effort.restarts or self.stopped():
                 break
         if self.statistics.grown == 0:
             raise NoTreeError(
@@ -369,12 +391,11 @@ class _Search:
             assert state.tree is not None
             if any(len(state.tree.keys ^ other.tree.keys) < 4 for other in chosen if other.tree):
                 continue
-            path = self.judge.path(state.tree.system)
-            if path is None:
+            candidate = self.candidate(state)
+            if candidate is None:
                 continue
             chosen.append(state)
-            tree = fold_tree(self.problem, state.pose, state.tree)
-            out.append(Candidate(tree, path, self.seed))
+            out.append(candidate)
             if len(out) == self.effort.keep:
                 break
         return out
@@ -386,6 +407,8 @@ def solve(
     foldability: Foldability,
     effort: Effort | None = None,
     statistics: Statistics | None = None,
+    report: Callable[[Candidate], None] | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> list[Candidate]:
     """Trees of rigid joints and half-turn hinges that fold, best first.
 
@@ -402,6 +425,11 @@ def solve(
     effort : Effort, optional
     statistics : Statistics, optional
         Counts what was done.
+    report : callable, optional
+        Called with each candidate that is better than all before.
+    stop : callable, optional
+        Asked at every step; the search ends with what it has once it says True. The result
+        then depends on when it does.
 
     Returns
     -------
@@ -415,5 +443,13 @@ def solve(
     NoFoldError
         If trees were found but none folds.
     """
-    search = _Search(problem, seed, foldability, effort or Effort(), statistics or Statistics())
+    search = _Search(
+        problem,
+        seed,
+        foldability,
+        effort or Effort(),
+        statistics or Statistics(),
+        report,
+        stop,
+    )
     return search.run()
