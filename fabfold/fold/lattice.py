@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.fold.cores import core_table
 from fabfold.fold.mechanism import Mechanism, Scene, mechanism, scene
 from fabfold.fold.planner import plan
 from fabfold.fold.shortcut import follow, shorten
@@ -23,6 +24,7 @@ from fabfold.fold.turns import count_stuck, movable_hinges
 from fabfold.tree.system import HingeSystem
 
 __all__ = [
+    "PRICE",
     "REPULSION",
     "Plan",
     "closure",
@@ -34,6 +36,8 @@ __all__ = [
 
 #: Weight of the repulsion between bodies against one step, see :func:`fabfold.fold.planner.plan`.
 REPULSION = 0.02
+#: What carving one pair of cells costs in the planner's key, in steps.
+PRICE = 0.3
 
 
 class Plan(NamedTuple):
@@ -60,22 +64,35 @@ class Plan(NamedTuple):
     apart: NDArray[np.int32]
 
 
-def _ready(system: HingeSystem) -> tuple[Mechanism, Scene, SweepTable]:
+def _ready(
+    system: HingeSystem, carve: float | None = None
+) -> tuple[Mechanism, Scene, SweepTable]:
     mech = mechanism(system)
     halves = len(mech.barrel) != len(mech.up)
-    return mech, scene(mech), sweep_table(mech.span, halves=halves)
+    if carve is None:
+        return mech, scene(mech), sweep_table(mech.span, halves=halves)
+    if halves:
+        raise ValueError("carve: wants a system of whole cells")
+    return mech, scene(mech), core_table(mech.span, carve)
 
 
-def closure(system: HingeSystem) -> tuple[int, int]:
+def closure(system: HingeSystem, *, carve: float | None = None) -> tuple[int, int]:
     """Hinges that nothing can ever set free, from shape A and from shape B.
 
     Necessary, not sufficient: (0, 0) does not mean that the system folds.
+
+    Parameters
+    ----------
+    system : HingeSystem
+    carve : float, optional
+        Let only the cores of cells count, cubes of this half side; see
+        :mod:`fabfold.fold.cores`.
 
     See Also
     --------
     fabfold.fold.turns.count_stuck : the test.
     """
-    mech, at, table = _ready(system)
+    mech, at, table = _ready(system, carve)
     start = np.zeros(len(mech.up), dtype=np.int8)
     return (
         int(count_stuck(mech, at, table, start, 1)),
@@ -83,9 +100,9 @@ def closure(system: HingeSystem) -> tuple[int, int]:
     )
 
 
-def stuck_hinges(system: HingeSystem) -> NDArray[np.bool_]:
+def stuck_hinges(system: HingeSystem, *, carve: float | None = None) -> NDArray[np.bool_]:
     """Which hinges nothing can ever set free, from A (first row) and from B, shape (2, h)."""
-    mech, at, table = _ready(system)
+    mech, at, table = _ready(system, carve)
     stuck = np.zeros((2, len(mech.up)), dtype=bool)
     start = np.zeros(len(mech.up), dtype=np.int8)
     stuck[0, mech.origin] = ~movable_hinges(mech, at, table, start, 1)
@@ -115,6 +132,8 @@ def find_path(
     *,
     repulsion: float = REPULSION,
     short: bool = True,
+    carve: float | None = None,
+    price: float = PRICE,
 ) -> Plan:
     """Search a folding path, one hinge at a time.
 
@@ -129,24 +148,35 @@ def find_path(
         Weight of the preference for open states.
     short : bool
         Shorten the path afterwards.
+    carve : float, optional
+        Let only the cores of cells count, cubes of this half side: the path is free once what
+        :func:`fabfold.fold.carving.plan_carving` says is taken out.
+    price : float
+        With `carve`: what a turn costs, in steps, for each pair of whole cells that it drives
+        into each other.
 
     Returns
     -------
     Plan
     """
-    mech, at, table = _ready(system)
+    mech, at, table = _ready(system, carve)
+    whole = table if carve is None else sweep_table(mech.span)
     total = int(mech.steps.sum())
-    levels, used, steps, differ = plan(mech, at, table, expansions, patience, repulsion)
+    levels, used, steps, differ = plan(
+        mech, at, table, expansions, patience, repulsion, whole, 0.0 if carve is None else price
+    )
     apart = np.zeros(len(system.parent), dtype=np.int32)
     apart[mech.origin] = differ
     if levels > 0:
         return Plan(int(levels), total, int(used), None, apart)
     if short:
-        steps = shorten(mech, at, table, steps)
+        steps = shorten(mech, at, table, whole, carve is not None, steps)
     return Plan(0, total, int(used), _merged(system, mech, steps), apart)
 
 
-def free_moves(system: HingeSystem, path: NDArray[np.integer]) -> int:
+def free_moves(
+    system: HingeSystem, path: NDArray[np.integer], *, carve: float | None = None
+) -> int:
     """How many moves of a path from A are free of collision, by the table.
 
     Parameters
@@ -154,13 +184,15 @@ def free_moves(system: HingeSystem, path: NDArray[np.integer]) -> int:
     system : HingeSystem
     path : (m, 2) integer array
         Hinge and signed quarter turns.
+    carve : float, optional
+        As for :func:`find_path`.
 
     Returns
     -------
     int
         ``len(path)`` when the whole path is free.
     """
-    mech, at, table = _ready(system)
+    mech, at, table = _ready(system, carve)
     place = np.argsort(mech.origin)
     q = np.zeros(len(mech.up), dtype=np.int8)
     for count, (hinge, turns) in enumerate(np.asarray(path, dtype=int).reshape(-1, 2).tolist()):

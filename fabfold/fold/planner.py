@@ -290,6 +290,9 @@ def _expand(
     middle: NDArray[np.int32],
     inverse: NDArray[np.float64],
     work: Work,
+    whole: SweepTable,
+    price: float,
+    cuts: Work,
 ) -> int:
     """Expand the best node of a front; returns a node that the other front has too, or -1."""
     hinges = len(mech.up)
@@ -318,6 +321,8 @@ def _expand(
                     front.force[new] += weight * _force_change(
                         mech, at, middle, inverse, k, way, work
                     )
+                if price > 0:
+                    front.force[new] += price * obstacles(mech, at, whole, k, way, cuts)
                 far = _distance(q, target)
                 front.key[new] = far + front.force[new]
                 _push(front, new)
@@ -338,6 +343,8 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
     limit: int,
     patience: int,
     weight: float,
+    whole: SweepTable,
+    price: float,
 ) -> tuple[int, int, NDArray[np.int16], NDArray[np.int8]]:
     """Search a path from A to B.
 
@@ -352,6 +359,11 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
         when both have given way in turn.
     weight : float
         Of the repulsion against one step.
+    whole : SweepTable
+        Sweeps of whole cells, where `table` has those of their cores: turns that are free by
+        `table` only need carving.
+    price : float
+        Of a cell that has to be carved, against one step; with 0 `whole` is not looked at.
 
     Returns
     -------
@@ -381,6 +393,7 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
     # Softened, so that bodies whose middles coincide do not count for everything.
     inverse = 1.0 / np.sqrt(0.25 + np.arange(12 * mech.reach * mech.reach + 1))
     work = workspace(0)
+    cuts = workspace(32)
     mine = _front(hinges, 1024)
     other = _front(hinges, 1024)
     _start(mine, start, finish)
@@ -414,7 +427,10 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
             continue
         while mine.tally[0] + 2 * hinges > len(mine.state):
             mine = _grown(mine)
-        met = _expand(mech, at, table, mine, other, target, weight, middle, inverse, work)
+        met = _expand(
+            mech, at, table, mine, other, target, weight, middle, inverse, work,
+            whole, price, cuts,
+        )  # fmt: skip
         used += 1
         idle += 1
         far = _distance(mine.state[mine.tally[3]], target)

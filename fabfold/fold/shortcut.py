@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, pose_scene
 from fabfold.fold.sweep import SweepTable
-from fabfold.fold.turns import turn_is_free
+from fabfold.fold.turns import obstacles, turn_is_free, workspace
 
-__all__ = ["follow", "shorten"]
+__all__ = ["cuts_on", "follow", "shorten"]
 
 
 @njit(cache=True)
@@ -44,24 +44,63 @@ def follow(
 
 
 @njit(cache=True)
+def cuts_on(
+    mech: Mechanism,
+    at: Scene,
+    whole: SweepTable,
+    q: NDArray[np.int8],
+    path: NDArray[np.int16],
+) -> int:
+    """Pairs of a cell and one in its way that whole cells would meet on a path from `q`."""
+    now = q.copy()
+    work = workspace(256)
+    total = 0
+    for i in range(len(path)):
+        k = path[i, 0]
+        pose_scene(mech, at, now)
+        total += obstacles(mech, at, whole, k, path[i, 1], work)
+        clear_scene(mech, at)
+        now[k] += path[i, 1]
+    return total
+
+
+@njit(cache=True)
 def _try(
     mech: Mechanism,
     at: Scene,
     table: SweepTable,
+    whole: SweepTable,
+    carved: bool,
     path: NDArray[np.int16],
     low: int,
+    size: int,
     part: NDArray[np.int16],
 ) -> bool:
-    """Whether `part` is free from the state in which `path` is before step `low`."""
+    """Whether `part` can stand for the `size` steps of `path` from `low` on.
+
+    It must be free, and where turns are free only because cells are carved, it must not need
+    more carving.
+    """
     q = np.zeros(len(mech.up), np.int8)
     for i in range(low):
         q[path[i, 0]] += path[i, 1]
-    return follow(mech, at, table, q, part) == len(part)
+    start = q.copy()
+    if follow(mech, at, table, q, part) < len(part):
+        return False
+    if not carved:
+        return True
+    old = cuts_on(mech, at, whole, start, path[low : low + size])
+    return cuts_on(mech, at, whole, start, part) <= old
 
 
 @njit(cache=True)
 def _drop(
-    mech: Mechanism, at: Scene, table: SweepTable, path: NDArray[np.int16]
+    mech: Mechanism,
+    at: Scene,
+    table: SweepTable,
+    whole: SweepTable,
+    carved: bool,
+    path: NDArray[np.int16],
 ) -> NDArray[np.int16]:
     """Leave out pairs of steps, forth and back of one hinge, that nothing between needs."""
     i = 0
@@ -71,7 +110,7 @@ def _drop(
             j += 1
         if j < len(path) and path[j, 1] == -path[i, 1]:
             part = path[i + 1 : j].copy()
-            if _try(mech, at, table, path, i, part):
+            if _try(mech, at, table, whole, carved, path, i, j + 1 - i, part):
                 path = np.concatenate((path[:i], part, path[j + 1 :]))
                 i = 0
                 continue
@@ -81,7 +120,12 @@ def _drop(
 
 @njit(cache=True)
 def _gather(
-    mech: Mechanism, at: Scene, table: SweepTable, path: NDArray[np.int16]
+    mech: Mechanism,
+    at: Scene,
+    table: SweepTable,
+    whole: SweepTable,
+    carved: bool,
+    path: NDArray[np.int16],
 ) -> tuple[NDArray[np.int16], bool]:
     """Bring the next step of a hinge up to the one before it, or the one before down to it."""
     changed = False
@@ -99,11 +143,11 @@ def _gather(
             between = path[i + 1 : j]
             early = np.concatenate((run, path[j : j + 1], between))
             late = np.concatenate((between, run, path[j : j + 1]))
-            if _try(mech, at, table, path, low, early):
+            if _try(mech, at, table, whole, carved, path, low, len(early), early):
                 path[low : j + 1] = early
                 changed = True
                 continue
-            if _try(mech, at, table, path, low, late):
+            if _try(mech, at, table, whole, carved, path, low, len(late), late):
                 path[low : j + 1] = late
                 changed = True
                 i = low
@@ -114,12 +158,21 @@ def _gather(
 
 @njit(cache=True)
 def shorten(
-    mech: Mechanism, at: Scene, table: SweepTable, path: NDArray[np.int16]
+    mech: Mechanism,
+    at: Scene,
+    table: SweepTable,
+    whole: SweepTable,
+    carved: bool,
+    path: NDArray[np.int16],
 ) -> NDArray[np.int16]:
     """Shorten a path from A to B; every step stays free.
 
     Parameters
     ----------
+    table, whole : SweepTable
+        What must stay free, and sweeps of whole cells.
+    carved : bool
+        `table` has the sweeps of the cells' cores: keep from carving more than before.
     path : (m, 2) int16 array
         Hinge of the mechanism and way (+1, -1) of each step.
 
@@ -127,10 +180,10 @@ def shorten(
     -------
     (k, 2) int16 array
     """
-    path = _drop(mech, at, table, path.copy())
+    path = _drop(mech, at, table, whole, carved, path.copy())
     for _ in range(8):
-        path, changed = _gather(mech, at, table, path)
+        path, changed = _gather(mech, at, table, whole, carved, path)
         if not changed:
             break
-        path = _drop(mech, at, table, path)
+        path = _drop(mech, at, table, whole, carved, path)
     return path
