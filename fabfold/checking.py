@@ -1,4 +1,4 @@
-"""Everything that is checked before a kit is written: bodies, certificate and replay."""
+"""Everything that is checked before a kit is written: bodies, certificate, samples and replay."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from fabfold.attempt import Made
 from fabfold.fold.replay import replay
+from fabfold.fold.sampled import sample_path
 from fabfold.printing.checks import Check, check_bodies
 from fabfold.printing.profiles import Profile
 from fabfold.progress import Progress
@@ -15,10 +16,15 @@ __all__ = ["run_checks"]
 
 #: Largest error of a hinge's angle at a keyframe of the replay, degrees.
 ANGLE_LIMIT_DEG = 1.0
+#: Degrees between poses that are searched for collisions, and at which the gap is measured.
+STEP_DEG = 1.0
+GAP_STEP_DEG = 10.0
+#: Volume that bodies may share in A or B before it is more than rounding, mm³.
+_OVERLAP_MM3 = 1e-3
 
 
 def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
-    """Check the tree, the certificate, the printed bodies and the replay.
+    """Check the tree, the certificate, the printed bodies, samples of the path and the replay.
 
     Parameters
     ----------
@@ -63,7 +69,9 @@ def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
     ]
     progress.update(0.1, "printability")
     checks += check_bodies(joinery, tree, motion, profile, progress)
-    progress.update(0.6, "replay in MuJoCo")
+    progress.update(0.5, "every degree of the path")
+    checks += _sampled(made, profile)
+    progress.update(0.8, "replay in MuJoCo")
     meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     report = replay(tree, motion, meshes, voxel_mm=joinery.voxel_mm, origin_mm=joinery.origin_mm)
     checks += [
@@ -86,3 +94,41 @@ def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
         ),
     ]
     return checks
+
+
+def _sampled(made: Made, profile: Profile) -> list[Check]:
+    """The second opinion on the path, by another library."""
+    tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
+    seen = sample_path(
+        tree.to_json(joinery.voxel_mm, joinery.origin_mm),
+        motion.to_json(),
+        {body.name: (body.vertices, body.faces) for body in joinery.bodies},
+        step_deg=STEP_DEG,
+        gap_step_deg=GAP_STEP_DEG,
+    )
+    clean = not seen.hits and seen.overlap_mm3 <= _OVERLAP_MM3
+    return [
+        Check(
+            name=f"moves with a collision, a look every {STEP_DEG:g}°",
+            figure=float(len(seen.hits)),
+            limit=0.0,
+            unit="moves",
+            ok=clean,
+            note=(
+                "; ".join(seen.hits[:3])
+                or (
+                    f"{seen.poses} poses, looked at by another library than the proof's (FCL)"
+                    if clean
+                    else f"bodies share {seen.overlap_mm3:.3f} mm³ in shape A or in the box"
+                )
+            ),
+        ),
+        Check(
+            name=f"smallest gap seen on the folding path, every {GAP_STEP_DEG:g}°",
+            figure=round(seen.least_mm, 4),
+            limit=profile.min_gap_mm,
+            unit="mm",
+            ok=seen.least_mm >= profile.min_gap_mm,
+            note=seen.where,
+        ),
+    ]
