@@ -23,6 +23,7 @@ __all__ = [
     "ROTATIONS",
     "ROTATION_INVERSE",
     "ROTATION_PRODUCT",
+    "Crease",
     "Template",
     "load_template",
     "parity",
@@ -124,6 +125,37 @@ def parity(cells: NDArray[np.generic]) -> IntArray:
 
 
 @dataclass(frozen=True)
+class Crease:
+    """A hinge line of a template that is folded once more when it is filled.
+
+    Attributes
+    ----------
+    start, end : three int
+        Corners of cells, between which the line runs: the corner ``(i, j, k)`` is the point
+        ``(i, j, k) - 0.5`` of the lattice.
+    angle_deg : int
+        Right-handed about the direction from `start` to `end`: 90, 180, -90 or -180.
+    moves : (k, 3) int32 array
+        The cells that turn, as the template lies before any fold.
+    """
+
+    start: tuple[int, int, int]
+    end: tuple[int, int, int]
+    angle_deg: int
+    moves: IntArray
+
+    def shifted(self, by: NDArray[np.integer]) -> Crease:
+        """The same crease moved by whole cells."""
+        x, y, z = (int(value) for value in by)
+        return Crease(
+            (self.start[0] + x, self.start[1] + y, self.start[2] + z),
+            (self.end[0] + x, self.end[1] + y, self.end[2] + z),
+            self.angle_deg,
+            np.asarray(self.moves + np.array([x, y, z]), dtype=np.int32),
+        )
+
+
+@dataclass(frozen=True)
 class Template:
     """A target shape made of cells.
 
@@ -133,18 +165,24 @@ class Template:
         Such as ``"box-4x4x4"``.
     cells : (m, 3) int32 array
         The cells in lattice coordinates, sorted, smallest coordinate 0 on every axis.
+    creases : tuple of Crease
+        Folds that the filled template makes in the end, in this order; most have none. See
+        :mod:`fabfold.creases`.
     """
 
     name: str
     cells: IntArray
+    creases: tuple[Crease, ...] = ()
 
     def __post_init__(self) -> None:
         cells = np.asarray(self.cells, dtype=np.int32).reshape(-1, 3)
         if len(cells) == 0:
             raise TemplateError(f"template {self.name!r} has no cells")
-        cells = np.unique(cells - cells.min(axis=0), axis=0)
+        low = cells.min(axis=0)
+        cells = np.unique(cells - low, axis=0)
         cells.setflags(write=False)
         object.__setattr__(self, "cells", cells)
+        object.__setattr__(self, "creases", tuple(c.shifted(-low) for c in self.creases))
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -161,6 +199,12 @@ class Template:
         odd = int(parity(self.cells).sum())
         return (len(self.cells) - odd, odd)
 
+    @property
+    def content(self) -> list[object]:
+        """All that the template is but for its name, as lists (JSON-ready)."""
+        folds = [[c.start, c.end, c.angle_deg, c.moves.tolist()] for c in self.creases]
+        return [self.cells.tolist(), *folds]
+
     def occupancy(self, pad: int = 0) -> NDArray[np.bool_]:
         """Boolean grid of the cells with `pad` empty cells on every side."""
         grid = np.zeros(np.array(self.shape) + 2 * pad, dtype=bool)
@@ -169,6 +213,9 @@ class Template:
 
 
 _BOX = re.compile(r"box-(\d+)x(\d+)x(\d+)")
+#: Most cells of a template, and most along an axis.
+MAX_CELLS = 4096
+MAX_SIDE = 64
 
 
 def templates_folder() -> Path:
@@ -181,68 +228,44 @@ def template_names() -> list[str]:
     return sorted(path.stem for path in templates_folder().glob("*.toml"))
 
 
-@cache
 def load_template(name: str) -> Template:
     """Template by name: ``box-AxBxC`` of any size, a shipped name, or a ``.toml`` file.
 
-    A file has ``name = "..."`` and either ``cells = [[i, j, k], ...]`` or ``layers``, a list of
-    layers from z = 0 upwards, each a list of strings (rows along y, characters along x) in which
-    ``#`` is a cell and ``.`` is none.
+    The format of a file is described in :mod:`fabfold.templates`. A mesh as the target is
+    :func:`fabfold.voxels.target.template_of_solid`.
 
     Raises
     ------
     TemplateError
         If there is no such template, or the file cannot be used.
     """
-    import tomllib
+    if Path(name).suffix == ".toml":
+        return _read(Path(name), name)
+    return _shipped(name)
 
+
+@cache
+def _shipped(name: str) -> Template:
     box = _BOX.fullmatch(name)
     if box:
         size = [int(group) for group in box.groups()]
-        if min(size) < 1 or max(size) > 32 or int(np.prod(size)) > 4096:
+        if min(size) < 1 or max(size) > MAX_SIDE or int(np.prod(size)) > MAX_CELLS:
             raise TemplateError(
-                f"template {name!r}: each side must be 1 to 32 cells, the whole at most 4096"
+                f"template {name!r}: each side must be 1 to {MAX_SIDE} cells, the whole at most "
+                f"{MAX_CELLS}"
             )
         return Template(name, np.argwhere(np.ones(size, dtype=bool)).astype(np.int32))
-    path = Path(name)
-    if path.suffix != ".toml":
-        path = templates_folder() / f"{name}.toml"
+    return _read(templates_folder() / f"{name}.toml", name)
+
+
+def _read(path: Path, name: str) -> Template:
+    # The file format stands below the lattice, which it is written in terms of.
+    from fabfold.templates import read_template
+
     if not path.is_file():
         known = ", ".join(template_names()) or "none"
         raise TemplateError(
             f"no template {name!r}: use box-AxBxC (for example box-4x4x4), "
-            f"the path of a .toml file, or one of: {known}"
+            f"the path of a .toml file or of a mesh, or one of: {known}"
         )
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise TemplateError(f"template file {path}: cannot be read: {error}") from error
-    unknown = set(data) - {"name", "cells", "layers", "description"}
-    if unknown or ("cells" in data) == ("layers" in data):
-        raise TemplateError(
-            f"template file {path}: wants a name and either cells or layers"
-            + (f"; unknown keys: {', '.join(sorted(unknown))}" if unknown else "")
-        )
-    return Template(str(data.get("name", path.stem)), _cells_of(data, path))
-
-
-def _cells_of(data: dict[str, object], path: Path) -> IntArray:
-    try:
-        if "cells" in data:
-            cells = np.array(data["cells"])
-            if cells.ndim != 2 or cells.shape[1] != 3 or cells.dtype.kind != "i":
-                raise ValueError("cells must be a list of [i, j, k] integers")
-            return cells.astype(np.int32)
-        layers = data["layers"]
-        if not isinstance(layers, list):
-            raise ValueError("layers must be a list of lists of strings")
-        found = [
-            (x, y, z)
-            for z, layer in enumerate(layers)
-            for y, row in enumerate(layer)
-            for x, character in enumerate(row)
-            if character == "#"
-        ]
-        return np.array(found, dtype=np.int32).reshape(-1, 3)
-    except (ValueError, TypeError, OverflowError) as error:
-        raise TemplateError(f"template file {path}: {error}") from error
+    return read_template(path)

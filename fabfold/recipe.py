@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from fabfold import __version__
 from fabfold.errors import FabfoldError, RecipeError
 from fabfold.lattice import load_template
+from fabfold.targets import is_file_name
 
 __all__ = ["Recipe", "read_recipe"]
 
@@ -29,6 +30,10 @@ class Recipe(BaseModel):
     model: Annotated[str, Field(min_length=1, description="file name, or sample:NAME")]
     sha256: Annotated[str, Field(description="digest of the model's file")] = ""
     template: Annotated[str, Field(description="box-AxBxC, a template's name or file")]
+    template_sha256: Annotated[str, Field(description="digest of the template's file")] = ""
+    template_cells: Annotated[
+        int | None, Field(ge=2, le=4096, description="cells of a template that is a mesh")
+    ] = None
     voxel_mm: Annotated[float, Field(gt=0, le=1000, description="side of a voxel, mm")] = 20.0
     profile: Annotated[str, Field(description="printer and material, or a .toml file")] = "mjf-pa12"
     clearance_mm: Annotated[
@@ -62,7 +67,9 @@ class Recipe(BaseModel):
     @field_validator("template")
     @classmethod
     def _known_template(cls, value: str) -> str:
-        load_template(value)
+        # A file is read by the kit, which knows where it is kept.
+        if not is_file_name(value):
+            load_template(value)
         return value
 
     @property
