@@ -57,14 +57,8 @@ def cores_meet(a: int, b: int, c: int, d: int, margin: float) -> bool:
         if square <= low or square >= high or bounds[i + 1] - bounds[i] < 1e-12:
             continue
         radius = np.sqrt(square)
-        if a1 * a1 + b0 * b0 <= square:
-            begin = np.arccos(a1 / radius)
-        else:
-            begin = np.arcsin(b0 / radius)
-        if c0 * c0 + d1 * d1 <= square:
-            end = np.arcsin(d1 / radius)
-        else:
-            end = np.arccos(c0 / radius)
+        begin = np.arccos(a1 / radius) if a1 * a1 + b0 * b0 <= square else np.arcsin(b0 / radius)
+        end = np.arcsin(d1 / radius) if c0 * c0 + d1 * d1 <= square else np.arccos(c0 / radius)
         if end > begin + 1e-12:
             return True
     return False

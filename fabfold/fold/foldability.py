@@ -46,11 +46,20 @@ class LatticeFoldability:
         because cells are not full; see :func:`octants_of`. Without it whole cells count. It
         costs several times as much, and what passes by it is less sure to survive the proof on
         the bodies.
+    carve : float, optional
+        For trees that fold only once cells lose corners: half the side of the core that is to be
+        left of a cell, :data:`fabfold.fold.cores.CORE`. All answers but :meth:`path` then look at
+        cores alone; :meth:`path` looks at whole cells first. Not together with `octants`.
+    material : (n, s, s, s) bool array, optional
+        With `carve`: material of the cells in shape A. Paths that cannot be carved without
+        cutting a hinge then do not count, and of several the one that costs least is taken.
     """
 
     expansions: int = 2500
     patience: int = 400
     octants: NDArray[np.bool_] | None = field(default=None, compare=False)
+    carve: float | None = None
+    material: NDArray[np.bool_] | None = field(default=None, compare=False)
 
     def _seen(self, system: HingeSystem) -> HingeSystem:
         from fabfold.fold.lattice import refined
@@ -61,13 +70,13 @@ class LatticeFoldability:
         """Hinges that the closure test cannot move, from A and from B."""
         from fabfold.fold.lattice import closure
 
-        return closure(self._seen(system))
+        return closure(self._seen(system), carve=self.carve)
 
     def stuck_hinges(self, system: HingeSystem) -> NDArray[np.bool_]:
         """Which hinges the closure test cannot move, from A and from B, shape (2, h)."""
         from fabfold.fold.lattice import stuck_hinges
 
-        return stuck_hinges(self._seen(system))
+        return stuck_hinges(self._seen(system), carve=self.carve)
 
     def remaining(self, system: HingeSystem, expansions: int) -> NDArray[np.int32]:
         """Quarter turns of each hinge that the planner could not resolve, shape (h,).
@@ -81,7 +90,9 @@ class LatticeFoldability:
         from fabfold.fold.lattice import find_path
 
         patience = min(expansions, self.patience)
-        return find_path(self._seen(system), self.expansions, patience, short=False).apart
+        return find_path(
+            self._seen(system), self.expansions, patience, short=False, carve=self.carve
+        ).apart
 
     def unresolved(self, system: HingeSystem, expansions: int) -> float:
         """Share of the quarter turns that the planner could not resolve.
@@ -100,7 +111,9 @@ class LatticeFoldability:
         from fabfold.fold.lattice import find_path
 
         patience = min(expansions, self.patience)
-        found = find_path(self._seen(system), self.expansions, patience, short=False)
+        found = find_path(
+            self._seen(system), self.expansions, patience, short=False, carve=self.carve
+        )
         return found.levels / found.total if found.total else float(found.levels > 0)
 
     def path(self, system: HingeSystem) -> NDArray[np.int32] | None:
@@ -117,8 +130,22 @@ class LatticeFoldability:
         from fabfold.fold.lattice import find_path
 
         seen = self._seen(system)
-        for patience in (self.patience, self.patience // 4, self.patience // 10):
+        looks = (self.patience, self.patience // 4, self.patience // 10)
+        for patience in looks:
             found = find_path(seen, self.expansions, patience).path
+            if found is not None:
+                return found
+        if self.carve is None:
+            return None
+        if self.material is not None:
+            from fabfold.fold.carving import carved_path
+
+            best = carved_path(
+                system, self.material, self.expansions, self.patience, carve=self.carve
+            )
+            return None if best is None else best[0]
+        for patience in looks:
+            found = find_path(system, self.expansions, patience, carve=self.carve).path
             if found is not None:
                 return found
         return None

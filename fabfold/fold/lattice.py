@@ -64,9 +64,7 @@ class Plan(NamedTuple):
     apart: NDArray[np.int32]
 
 
-def _ready(
-    system: HingeSystem, carve: float | None = None
-) -> tuple[Mechanism, Scene, SweepTable]:
+def _ready(system: HingeSystem, carve: float | None = None) -> tuple[Mechanism, Scene, SweepTable]:
     mech = mechanism(system)
     halves = len(mech.barrel) != len(mech.up)
     if carve is None:
