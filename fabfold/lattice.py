@@ -168,11 +168,14 @@ class Template:
     creases : tuple of Crease
         Folds that the filled template makes in the end, in this order; most have none. See
         :mod:`fabfold.creases`.
+    joints : str
+        ``"any"``, or ``"inside"`` where no hinge may lie on the surface of the folded shape.
     """
 
     name: str
     cells: IntArray
     creases: tuple[Crease, ...] = ()
+    joints: str = "any"
 
     def __post_init__(self) -> None:
         cells = np.asarray(self.cells, dtype=np.int32).reshape(-1, 3)
@@ -201,9 +204,31 @@ class Template:
 
     @property
     def content(self) -> list[object]:
-        """All that the template is but for its name, as lists (JSON-ready)."""
+        """Its shape and its folds, as lists (JSON-ready)."""
         folds = [[c.start, c.end, c.angle_deg, c.moves.tolist()] for c in self.creases]
         return [self.cells.tolist(), *folds]
+
+    def inside_edges(self) -> NDArray[np.bool_]:
+        """Lattice edges that lie inside the shape: all four cells around them belong to it.
+
+        Returns
+        -------
+        (2 x + 1, 2 y + 1, 2 z + 1) bool array
+            By twice the middle of the edge, plus 1.
+        """
+        near = self.occupancy(pad=1)
+        inside = np.zeros(2 * np.array(self.shape) + 1, dtype=bool)
+        for axis in range(3):
+            one, other = (k for k in range(3) if k != axis)
+            around = near & np.roll(near, -1, axis=one)
+            around &= np.roll(around, -1, axis=other)
+            # Entry e of a padded grid is cell e - 1; the edge lies on its upper side.
+            at = np.argwhere(around)
+            middle = 2 * (at - 1) + 1
+            middle[:, one] += 1
+            middle[:, other] += 1
+            inside[tuple(middle.T)] = True
+        return inside
 
     def occupancy(self, pad: int = 0) -> NDArray[np.bool_]:
         """Boolean grid of the cells with `pad` empty cells on every side."""

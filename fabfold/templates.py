@@ -11,6 +11,8 @@ A template that is folded once more when it is filled has ``[[fold]]`` tables, c
 order: the line from the corner ``from`` to the corner ``to``, the ``angle`` in degrees
 (right-handed about that direction), and ``moves``, the block or the list of blocks that turns,
 all as the template lies before any fold.
+
+``joints = "inside"`` keeps hinges off the faces that can be seen of the filled template.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from fabfold.lattice import FACES, MAX_CELLS, MAX_SIDE, Crease, IntArray, Templa
 
 __all__ = ["pieces_of", "read_template"]
 
-_KEYS = {"name", "description", "cells", "layers", "box", "remove", "fold"}
+_KEYS = {"name", "description", "cells", "layers", "box", "remove", "fold", "joints"}
 
 
 def read_template(path: Path) -> Template:
@@ -94,7 +96,10 @@ def _template(data: dict[str, Any], stem: str) -> Template:
             f"smallest has cell {stray}"
         )
     creases = tuple(_crease(entry, k) for k, entry in enumerate(_tables(data, "fold")))
-    return Template(name, cells, creases)
+    joints = data.get("joints", "any")
+    if joints not in ("any", "inside"):
+        raise ValueError(f'joints: wants "any" or "inside", found {joints!r}')
+    return Template(name, cells, creases, joints)
 
 
 def pieces_of(cells: IntArray) -> list[list[int]]:
