@@ -1,0 +1,329 @@
+"""Trees that fold, seed by seed: writes benchmarks/search_table.md and .json.
+
+    python benchmarks/search_table.py [--models bunny car ...] [--seeds 1 2 3 4 5] [--seconds 60]
+        [--joints S S+D] [--work DIR] [--only-table]
+
+Every run searches one model with one seed and one set of joints for so many seconds of one core,
+as the product does, and notes when each better tree came. Then the first and the best tree of the
+run are built, proven by the swept test, and looked at by an independent check every degree.
+Everything is kept in the work folder, one JSON a run: what is there is not made again (a run with
+fewer seconds than now asked for is), and the table is made of all that is there.
+
+Groups of models: paper (the paper's), dev (the ten others).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import runs
+from runs import DEV, HERE, MODELS, PAPER
+
+SEEDS = (1, 2, 3, 4, 5)
+#: Seconds at which the best so far is told, where runs were as long.
+MARKS = (60.0, 300.0)
+
+
+def path_of(work: Path, kind: str, name: str, joints: str, seed: int) -> Path:
+    return work / kind / f"{name}-{joints}-{seed}.json"
+
+
+def do_run(options: argparse.Namespace) -> None:
+    """One run, in a process of its own."""
+    name, joints, seed = options.run[0], options.run[1], int(options.run[2])
+    found = runs.timed_run(MODELS[name], options.work / name, seed, joints, options.seconds)
+    runs.write(path_of(options.work, "runs", name, joints, seed), found)
+
+
+def do_proof(options: argparse.Namespace) -> None:
+    """Build and prove what one run found."""
+    name, joints, seed = options.proof[0], options.proof[1], int(options.proof[2])
+    run = runs.read(path_of(options.work, "runs", name, joints, seed))
+    found = runs.proven(MODELS[name], options.work / name, run, options.gap_step)
+    found["run"] = [run["seconds"], len(run["events"])]
+    runs.write(path_of(options.work, "proofs", name, joints, seed), found)
+
+
+def missing(options: argparse.Namespace, names: list[str]) -> list[tuple[str, str, int]]:
+    out = []
+    for seed in options.seeds:
+        for name in names:
+            for joints in options.joints:
+                run = runs.read(path_of(options.work, "runs", name, joints, seed))
+                if run is None or (run["seconds"] < options.seconds and "error" not in run):
+                    out.append((name, joints, seed))
+    return out
+
+
+def unproven(options: argparse.Namespace, names: list[str]) -> list[tuple[str, str, int]]:
+    out = []
+    for seed in options.seeds:
+        for name in names:
+            for joints in options.joints:
+                run = runs.read(path_of(options.work, "runs", name, joints, seed))
+                proof = runs.read(path_of(options.work, "proofs", name, joints, seed))
+                wanted = run and run["events"]
+                if wanted and (not proof or proof["run"] != [run["seconds"], len(run["events"])]):
+                    out.append((name, joints, seed))
+    return out
+
+
+def measure(options: argparse.Namespace, names: list[str]) -> None:
+    """Make all runs and proofs that are missing."""
+    base = [sys.executable, __file__, "--work", str(options.work)]
+    base += ["--seconds", str(options.seconds), "--gap-step", str(options.gap_step)]
+    # Voxelizations first, so that no two runs make the same one.
+    fresh = [n for n in names if not (options.work / n / "voxelize-seconds.json").is_file()]
+    runs.side_by_side([[*base, "--voxels", n] for n in fresh], options.workers, fresh)
+    for kind, left in (("run", missing), ("proof", unproven)):
+        todo = left(options, names)
+        runs.side_by_side(
+            [[*base, f"--{kind}", name, joints, str(seed)] for name, joints, seed in todo],
+            options.workers,
+            [f"{kind} {name} {joints} seed {seed}" for name, joints, seed in todo],
+        )
+
+
+# --- the table --------------------------------------------------------------------------------
+
+
+def collect(work: Path) -> dict[str, Any]:
+    """All runs that are there, without their trees, joined with their proofs."""
+    out: dict[str, Any] = {}
+    for name in MODELS:
+        for joints in ("S", "S+D"):
+            for seed in SEEDS:
+                run = runs.read(path_of(work, "runs", name, joints, seed))
+                if run is None:
+                    continue
+                run.pop("trees")
+                run["proof"] = runs.read(path_of(work, "proofs", name, joints, seed))
+                run["voxelize"] = runs.read(work / name / "voxelize-seconds.json")
+                out.setdefault(name, {}).setdefault(joints, {})[str(seed)] = run
+    return out
+
+
+def first_certified(run: dict[str, Any]) -> float | None:
+    proof = run["proof"]
+    if not proof or proof["first"] is None:
+        return None
+    return float(run["events"][proof["first"]]["cpu"])
+
+
+def best_at(run: dict[str, Any], seconds: float) -> dict[str, Any] | None:
+    """Best tree after so many seconds; None where there was none, or the run was shorter."""
+    if run["seconds"] < seconds:
+        return None
+    found = [event for event in run["events"] if event["cpu"] <= seconds]
+    return found[-1] if found else None
+
+
+def joints_of(event: dict[str, Any]) -> int:
+    return int(sum(event["joints"].values()))
+
+
+def spread(values: list[float], form: str = "{:.0f}") -> str:
+    """Least of some values, and their median in brackets."""
+    if not values:
+        return "–"
+    return f"{form.format(min(values))} ({form.format(median(values))})"
+
+
+def seconds_of(entries: list[dict[str, Any]]) -> tuple[str, str]:
+    """Median and worst seconds to the first certified tree; a run without one counts as endless."""
+    times = sorted(float("inf") if (t := first_certified(run)) is None else t for run in entries)
+    longest = max(run["seconds"] for run in entries)
+
+    def told(value: float) -> str:
+        return f"> {longest:g}" if value == float("inf") else f"{value:.1f}"
+
+    return told(median(times)), told(times[-1])
+
+
+def marks_of(entries: list[dict[str, Any]]) -> list[float]:
+    """Seconds at which the best so far is told."""
+    longest = max((run["seconds"] for run in entries), default=MARKS[0])
+    return [mark for mark in MARKS if mark <= longest] or [longest]
+
+
+def row(name: str, joints: str, by_seed: dict[str, Any], marks: list[float]) -> str:
+    model, entries = MODELS[name], list(by_seed.values())
+    if all("error" in run for run in entries):
+        return f"| {name} | {joints} | {model.template} | | {entries[0]['error']} |"
+    entries = [run for run in entries if "error" not in run]
+    certified = [run for run in entries if first_certified(run) is not None]
+    middle, worst = seconds_of(entries)
+    cells = [
+        name,
+        joints,
+        f"{entries[0]['voxels'][0]} in {model.template}",
+        f"{len(certified)} of {len(entries)}",
+        middle,
+        worst,
+        f"{model.aim_seconds:g}" if model.aim_seconds else "–",
+    ]
+    for mark in marks:
+        best = [event for run in entries if (event := best_at(run, mark))]
+        cells.append(spread([joints_of(event) for event in best]))
+        cells.append(spread([event["total"] for event in best], "{:.2f}"))
+    proofs = [
+        run["proof"]["tried"][str(run["proof"][what])]
+        for run in certified
+        for what in ("first", "best")
+        if run["proof"][what] is not None
+    ]
+    cells += [
+        f"{model.aim_joints}" if model.aim_joints else "–",
+        f"{model.paper_joints}" if model.paper_joints else "–",
+        f"{model.paper_hours}" if model.paper_hours else "–",
+        f"{min(p['proven_mm'] for p in proofs):.3f}" if proofs else "–",
+        f"{min(p['sampled_mm'] for p in proofs):.3f}" if proofs else "–",
+        f"{median(p['seconds'] for p in proofs):.0f}" if proofs else "–",
+        f"{entries[0]['voxelize']:.1f}" if entries[0]["voxelize"] else "–",
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def head(marks: list[float]) -> list[str]:
+    cells = ["model", "joints", "voxels", "certified", "first s, median", "worst", "aim"]
+    for mark in marks:
+        cells += [f"joints {mark:g} s", f"energy {mark:g} s"]
+    cells += ["aim", "paper", "paper core-h", "proven mm", "sampled mm", "build s", "voxels s"]
+    return ["| " + " | ".join(cells) + " |", "|---|---|---|" + "--:|" * (len(cells) - 3)]
+
+
+def compared(data: dict[str, Any]) -> list[str]:
+    """Surface energy with double hinges against single hinges alone."""
+    lines = []
+    for name, kinds in data.items():
+        last = {
+            joints: [run["events"][-1] for run in by_seed.values() if run["events"]]
+            for joints, by_seed in kinds.items()
+        }
+        if not (last.get("S") and last.get("S+D")):
+            continue
+        one, two = (median(e["surface"] for e in last[j]) for j in ("S", "S+D"))
+        doubles = median(e["joints"].get("D", 0) for e in last["S+D"])
+        change = f"{100 * (two / one - 1):+.0f} %" if one else "–"
+        lines.append(f"| {name} | {one:.2f} | {two:.2f} | {change} | {doubles:.0f} |")
+    if not lines:
+        return []
+    return [
+        "",
+        "## Surface energy, double hinges beside single ones",
+        "",
+        "Eq. 8, median of the seeds' best trees at the end of the run; the aim is a third less.",
+        "",
+        "| model | S | S+D | change | double joints |",
+        "|---|--:|--:|--:|--:|",
+        *lines,
+    ]
+
+
+def refusals(data: dict[str, Any]) -> list[str]:
+    """Runs without a certified tree, and why."""
+    lines = []
+    for name, kinds in data.items():
+        for joints, by_seed in kinds.items():
+            for seed, run in by_seed.items():
+                if "error" in run or first_certified(run) is not None:
+                    continue
+                proof = run["proof"]
+                if not run["events"]:
+                    why = f"no tree folds in {run['seconds']:g} s"
+                elif not proof:
+                    why = "not proven yet"
+                else:
+                    tried = list(proof["tried"].values())
+                    why = f"{len(tried)} trees refused on the bodies: {tried[-1]['why']}"
+                lines.append(f"- {name}, {joints}, seed {seed}: {why}")
+    return ["", "## Without a certificate", "", *lines] if lines else []
+
+
+def table(data: dict[str, Any], facts: dict[str, Any]) -> str:
+    """Markdown of all that is there."""
+    runs_there = [run for kinds in data.values() for by in kinds.values() for run in by.values()]
+    measured = [run for run in runs_there if "error" not in run]
+    marks = marks_of(measured)
+    load = max((run["wall"] / max(run["cpu"], 1e-9) for run in measured), default=1.0)
+    kernels = max((run["kernels"] for run in measured), default=0.0)
+    lines = [
+        "# Trees that fold",
+        "",
+        "Written by `python benchmarks/search_table.py`. A run is one model, one seed and one set",
+        f"of joints on one core, {facts['workers']} runs side by side, with the product's defaults.",
+        "Seconds are seconds of that core from the start of the search, with voxels made and",
+        f"kernels loaded before (at most {kernels:.1f} s); the clock showed at most {load:.2f} times",
+        "as much. *Certified*: seeds with a tree whose printed bodies were built, proven by the",
+        "swept test, and seen free of collision at every degree by an independent check. *First*:",
+        "when the first such tree was found; building and proving it takes *build s* more. *Joints*",
+        "and *energy* (paper's weights): best of the seeds, median in brackets. *Proven*, *sampled*:",
+        "smallest gap of all trees of the row by the swept test, and seen by the other check.",
+        "",
+        f"Machine: {runs.machine_line(facts)}.",
+    ]
+    for title, names in (("The paper's models", PAPER), ("Ten other models", DEV)):
+        rows = [
+            row(name, joints, data[name][joints], marks)
+            for name in names
+            if name in data
+            for joints in data[name]
+        ]
+        if rows:
+            lines += ["", f"## {title}", "", *head(marks), *rows]
+    lines += compared(data) + refusals(data)
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--models", nargs="+", default=["paper"], help="names, paper, dev, or all")
+    parser.add_argument("--seeds", nargs="+", type=int, default=list(SEEDS))
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--joints", nargs="+", default=["S"], choices=["S", "S+D"])
+    parser.add_argument("--work", type=Path, default=Path("search-runs"))
+    parser.add_argument("--workers", type=int, default=2, help="runs side by side")
+    parser.add_argument(
+        "--gap-step", type=float, default=10.0, help="degrees between measured gaps (1 is slow)"
+    )
+    parser.add_argument("--only-table", action="store_true")
+    parser.add_argument("--out", type=Path, default=HERE / "search_table.md")
+    parser.add_argument("--voxels", help=argparse.SUPPRESS)
+    parser.add_argument("--run", nargs=3, help=argparse.SUPPRESS)
+    parser.add_argument("--proof", nargs=3, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.voxels:
+        runs.voxelized(MODELS[options.voxels], options.work / options.voxels)
+        return
+    if options.run:
+        do_run(options)
+        return
+    if options.proof:
+        do_proof(options)
+        return
+    names: list[str] = []
+    for name in options.models:
+        names += {"paper": list(PAPER), "dev": list(DEV), "all": list(MODELS)}.get(name, [name])
+    unknown = [name for name in names if name not in MODELS]
+    if unknown:
+        parser.error(f"no such models: {', '.join(unknown)}")
+    if not options.only_table:
+        measure(options, names)
+    data = collect(options.work)
+    facts = {**runs.machine(), "workers": options.workers}
+    options.out.write_text(table(data, facts), encoding="utf-8")
+    content = {"machine": facts, "runs": data}
+    options.out.with_suffix(".json").write_text(
+        json.dumps(content, indent=1) + "\n", encoding="utf-8"
+    )
+
+
+if __name__ == "__main__":
+    main()
