@@ -12,8 +12,8 @@
         voxel_mm, clearance_mm, first="+y", second="-y", turns=(180, 180), *,
         barrel_radius_mm=None, pin_radius_mm=None, knuckles=None, plate_mm=None,
         gap_mm=None, bracket_mm=None, margin_mm=None, wall_mm=0.8, segments=64,
-    ) -> DoubleHingeMeshes(parent_half, link, child_half, parent_carve, child_carve,
-                           barrel_radius_mm, pin_radius_mm, knuckles, reach_mm)
+    ) -> DoubleHingeMeshes(parent_half, link, child_half, parent_carve, child_carve, plate,
+                           barrel_radius_mm, pin_radius_mm, knuckles, reach_mm, plate_mm)
 
     each piece: MeshPart(vertices (v, 3) float64 in mm, faces (f, 3) int32)
 
@@ -52,7 +52,7 @@ from .clearance import Clearance
 from .leaf import Bracket
 from .pins import ConePin
 from .plan import HalfPlan, SingleSpec, default_pin_radius, default_radii, plan_single
-from .plan_double import DoubleSpec, plan_double
+from .plan_double import DoubleSpec, plan_double, plate_shape
 from .shapes import Moved, Prism, Shape
 
 if TYPE_CHECKING:
@@ -124,11 +124,16 @@ class DoubleHingeMeshes(NamedTuple):
         The link plate with its knuckles: a body of its own.
     parent_carve, child_carve : MeshPart
         To subtract from each body first.
+    plate : MeshPart
+        The link plate alone, without knuckles and grooves. Along edges without an axis it keeps the
+        margin free, so that another hinge's barrel on such an edge does not meet it.
     barrel_radius_mm, pin_radius_mm : float
     knuckles : int
         On each axis; of both together when they share an edge.
     reach_mm : float
         Radius of the groove that a barrel needs in any other body.
+    plate_mm : float
+        Thickness of the link plate.
     """
 
     parent_half: MeshPart
@@ -136,10 +141,12 @@ class DoubleHingeMeshes(NamedTuple):
     child_half: MeshPart
     parent_carve: MeshPart
     child_carve: MeshPart
+    plate: MeshPart
     barrel_radius_mm: float
     pin_radius_mm: float
     knuckles: int
     reach_mm: float
+    plate_mm: float
 
 
 def solid_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
@@ -360,6 +367,7 @@ def double_hinge_meshes(
         child_half=made.child_half.copied(),
         parent_carve=made.parent_carve.copied(),
         child_carve=made.child_carve.copied(),
+        plate=made.plate.copied(),
     )
 
 
@@ -414,8 +422,10 @@ def _double(
         part_of(child),
         part_of(parent_carve),
         part_of(child_carve),
+        part_of(solid_of(plate_shape(spec), segments, outside=False)),
         barrel,
         pin,
         count,
         reach,
+        spec.plate,
     )

@@ -24,7 +24,15 @@ from .plan import HalfPlan, default_pin_radius, default_radii, wall_of
 from .shapes import Moved, Point, Prism, Shape, box, cylinder
 from .train import Train, groove, lay_out
 
-__all__ = ["EDGES", "DoublePlan", "DoubleSpec", "child_pose", "link_pose", "plan_double"]
+__all__ = [
+    "EDGES",
+    "DoublePlan",
+    "DoubleSpec",
+    "child_pose",
+    "link_pose",
+    "plan_double",
+    "plate_shape",
+]
 
 Matrix = NDArray[np.float64]
 Edge = Literal["+y", "-y", "+z", "-z"]
@@ -222,17 +230,18 @@ def child_pose(spec: DoubleSpec, first: float, second: float) -> Matrix:
     return link_pose(spec, first) @ _about(spec.frame(1), -second)
 
 
-def _plate(spec: DoubleSpec, grow: float) -> Moved:
-    """Draw the link plate, `grow` mm larger on every side."""
+def plate_shape(spec: DoubleSpec, grow: float = 0.0, beyond: float = 0.0) -> Moved:
+    """Draw the link plate, `grow` mm larger on every side and `beyond` mm more in its plane."""
     u_dir = np.array(EDGES[spec.first])
     v_dir = np.cross((1.0, 0.0, 0.0), u_dir)
     frame = np.eye(4)
     frame[:3, 0], frame[:3, 1], frame[:3, 2] = u_dir, v_dir, (1.0, 0.0, 0.0)
-    edge, inner = 0.5 * spec.size + grow, 0.5 * spec.size - spec.margin + grow
+    wider = grow + beyond
+    edge, inner = 0.5 * spec.size + wider, 0.5 * spec.size - spec.margin + wider
     outline: tuple[Point, ...]
     turned = float(np.dot(v_dir, EDGES[spec.second]))
     if spec.same_edge:
-        low = 0.5 * spec.size - _width(spec) - grow
+        low = 0.5 * spec.size - _width(spec) - wider
         outline = ((low, -inner), (edge, -inner), (edge, inner), (low, inner))
     elif abs(turned) < 0.5:
         outline = ((-edge, -inner), (edge, -inner), (edge, inner), (-edge, inner))
@@ -249,6 +258,12 @@ def _plate(spec: DoubleSpec, grow: float) -> Moved:
             outline = tuple((u, -v) for u, v in reversed(outline))
     half = 0.5 * spec.plate + grow
     return placed(frame, Prism(outline, -half, half))
+
+
+def _swing(spec: DoubleSpec) -> float:
+    """How far the plate's far edge reaches beyond its place at rest as the plate sets off, mm."""
+    arm = _width(spec) if spec.same_edge else spec.size - spec.margin
+    return sqrt(arm**2 + (0.5 * spec.plate) ** 2) - arm
 
 
 def _width(spec: DoubleSpec) -> float:
@@ -361,7 +376,7 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
         roofs = spec.pin.bores(train, spec.roof)
         carve: list[Shape] = [placed(rows, groove(train, owner, core))]
         carve += [placed(rows, shape) for shape in spec.pin.access(train, edge)]
-        in_way: list[Shape] = [_plate(spec, spec.clearance.radial)]
+        in_way: list[Shape] = [plate_shape(spec, spec.clearance.radial, _swing(spec))]
         if not spec.same_edge:
             other = trains[1 - index]
             axial = spec.clearance.axial
@@ -381,7 +396,7 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
     in_link = [(spec.frame(index), train, links[index]) for index, train in enumerate(trains)]
     link = HalfPlan(
         tuple(placed(rows, cut) for rows, _, cut in in_link),
-        (_plate(spec, 0.0),),
+        (plate_shape(spec),),
         tuple(
             placed(rows, shape)
             for rows, train, _ in in_link

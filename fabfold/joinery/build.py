@@ -11,9 +11,12 @@ from fabfold.errors import GeometryError
 from fabfold.fold.barrels import first_encounter
 from fabfold.fold.model import Motion
 from fabfold.joinery.cells import eroded_cells, model_manifold
-from fabfold.joinery.grooves import Passage, groove_tools, passages
+from fabfold.joinery.cutting import Cut, less, meeting, united
+from fabfold.joinery.grooves import Passage, passages
+from fabfold.joinery.links import link_body
 from fabfold.joinery.model import BodyMesh, Joinery
-from fabfold.joinery.placement import HingePieces, hinge_pieces, knuckle_zone
+from fabfold.joinery.placement import fittings
+from fabfold.joinery.plates import plate_passages
 from fabfold.joinery.sizes import HingeSize, hinge_size, strut_width
 from fabfold.joinery.soundness import finish_mesh
 from fabfold.joinery.unite import CRUMB_SHARE, Tally, one_piece
@@ -25,9 +28,6 @@ if TYPE_CHECKING:
     import manifold3d
 
 __all__ = ["build_bodies"]
-
-#: A groove may not take more than this from the knuckles of a hinge, in mm³.
-_ZONE_LOSS_MM3 = 0.01
 
 
 def build_bodies(
@@ -45,8 +45,9 @@ def build_bodies(
     """Make the printed bodies of a kit.
 
     Each body is the warped model inside its own cells, inset by half the clearance from every cell
-    that is not its own, with its hinge halves added, with grooves wherever the barrel of another
-    hinge passes on the folding path, and with struts where the cut left its material in pieces.
+    that is not its own, with its hinge halves added, with grooves and pockets wherever the barrel
+    or the link plate of another hinge passes on the folding path, and with struts where the cut
+    left its material in pieces. The link of a double hinge is a body too.
 
     Parameters
     ----------
@@ -72,8 +73,9 @@ def build_bodies(
     RecipeError
         If no hinge fits the voxel size and clearance.
     GeometryError
-        If this tree cannot be built: a barrel passes through the knuckles of another hinge, or a
-        body cannot be made one piece. The message names the bodies.
+        If this tree cannot be built: a barrel passes through the knuckles of another hinge, a
+        double hinge does not fit, a link is cut apart, or a body cannot be made one piece. The
+        message names the bodies.
 
     References
     ----------
@@ -85,16 +87,22 @@ def build_bodies(
     told.update(0.0, "preparing the model and the hinges")
     _refuse_encounters(tree, motion, size, voxel_mm)
     model = model_manifold(voxels, voxel_mm)
-    hinges = hinge_pieces(tree, size, voxel_mm)
+    fitted = fittings(tree, motion, size, voxel_mm)
     ways: list[list[Passage]] = [[] for _ in tree.bodies]
     for passage in passages(tree, motion, 1.05 * size.reach_mm / voxel_mm):
         ways[passage.body].append(passage)
+    plate_ways: list[list[Passage]] = [[] for _ in tree.bodies]
+    for passage in plate_passages(
+        tree, motion, fitted.plates, voxel_mm=voxel_mm, clearance_mm=clearance_mm
+    ):
+        plate_ways[passage.body].append(passage)
     tally = Tally()
     origin = voxel_mm * (0.5 - tree.source.min(axis=0).astype(float))
     meshes = []
     for index, body in enumerate(tree.bodies):
         told.update(index / len(tree.bodies), f"cutting {body.name}")
-        solid = _body(index, tree, model, hinges, ways[index], size, voxel_mm, tally)
+        cut = Cut(index, tree, fitted, ways[index], plate_ways[index], size, voxel_mm)
+        solid = link_body(cut, tally) if index in fitted.plates else _body(cut, model, tally)
         vertices, faces = finish_mesh(solid, body.name, origin)
         meshes.append(BodyMesh(body.name, vertices, faces))
     told.update(1.0, f"{len(meshes)} bodies, {tally.struts} struts")
@@ -111,16 +119,21 @@ def build_bodies(
         carved_mm3=round(tally.carved_mm3, 3),
         dropped_mm3=round(tally.dropped_mm3, 3),
         struts=tally.struts,
-        notes=_notes(tally, voxel_mm),
+        notes=_notes(tally, voxel_mm, len(fitted.plates)),
     )
 
 
-def _notes(tally: Tally, voxel_mm: float) -> tuple[str, ...]:
+def _notes(tally: Tally, voxel_mm: float, links: int) -> tuple[str, ...]:
     notes = []
     if tally.carved_cells:
         notes.append(
-            f"{tally.carved_mm3:.0f} mm³ taken out of {tally.carved_cells} cells "
-            "so that hinge barrels can pass"
+            f"{tally.carved_mm3:.0f} mm³ taken out of {tally.carved_cells} cells so that hinge "
+            + ("barrels and link plates can pass" if links else "barrels can pass")
+        )
+    if tally.links_mm3 > 0.01:
+        notes.append(
+            f"{tally.links_mm3:.0f} mm³ taken out of {tally.links_cut} of {links} link plates so "
+            "that hinge barrels and other links can pass"
         )
     if tally.hollows:
         notes.append(
@@ -160,12 +173,6 @@ def _check_inputs(
                 f"move {step} turns {len(moving)} hinges at once; "
                 "grooves need a path that turns one hinge at a time"
             )
-    for edge in tree.edges:
-        if edge.kind == "D":
-            raise GeometryError(
-                f"the joint between voxels {edge.parent} and {edge.child} is a double hinge, "
-                "which cannot be printed yet; use single hinges"
-            )
 
 
 def _refuse_encounters(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm: float) -> None:
@@ -185,105 +192,33 @@ def _refuse_encounters(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm
         )
 
 
-def _body(
-    index: int,
-    tree: FoldTree,
-    model: manifold3d.Manifold,
-    hinges: list[HingePieces],
-    ways: list[Passage],
-    size: HingeSize,
-    voxel_mm: float,
-    tally: Tally,
-) -> manifold3d.Manifold:
+def _body(cut: Cut, model: manifold3d.Manifold, tally: Tally) -> manifold3d.Manifold:
     """One body as one connected solid, lattice origin at zero."""
-    body = tree.bodies[index]
-    cells = tree.source[list(body.voxels)]
+    voxel_mm, size = cut.voxel_mm, cut.size
+    cells = cut.tree.source[list(cut.tree.bodies[cut.index].voxels)]
     room = eroded_cells(cells, voxel_mm, size.clearance_mm / 2)
-    own = [
-        (h, pieces.parent_half, pieces.parent_carve)
-        if tree.hinges[h].parent == index
-        else (h, pieces.child_half, pieces.child_carve)
-        for h, pieces in enumerate(hinges)
-        if index in (tree.hinges[h].parent, tree.hinges[h].child)
+    own = cut.fitted.halves[cut.index]
+    carves = [item.carve for item in own]
+    material = less(model ^ room, carves)
+    halves = [
+        less(item.half, [other.carve for other in own if other.hinge != item.hinge]) for item in own
     ]
-    carves = [carve for _, _, carve in own]
-    material = _less(model ^ room, carves)
-    halves = [_less(half, [carve for other, _, carve in own if other != h]) for h, half, _ in own]
-    tools = groove_tools(
-        ways,
-        *_boxes(cells, halves, voxel_mm),
-        voxel_mm=voxel_mm,
-        radius_mm=size.reach_mm,
-        trim_mm=size.barrel_radius_mm,
-    )
-    _protect_zones(index, tree, tools, [h for h, _, _ in own], size, voxel_mm)
-    in_material = _meeting(tools, material)
+    boxes = cut.boxes(cells, halves)
+    grooves = cut.grooves(*boxes)
+    pockets = cut.pockets(*boxes)
+    in_material = meeting([*grooves, *pockets], material)
     if in_material:
-        lost, material = material.split(_united(in_material))
+        lost, material = material.split(united(in_material))
         volume = lost.volume()
         if volume > 0.01:
             tally.carved_mm3 += volume
             tally.carved_cells += _cells_of(lost, cells, voxel_mm)
-    halves = [_less(half, _meeting(tools, half)) for half in halves]
+    halves = [cut.half(half, grooves, pockets) for half in halves]
 
     def free() -> manifold3d.Manifold:
-        return _less(room, [*carves, *(tool for _, tool in tools)])
+        return less(room, [*carves, *(tool for _, tool in (*grooves, *pockets))])
 
-    return one_piece(body.name, cells, free, material, halves, voxel_mm, tally)
-
-
-def _evaluated(solid: manifold3d.Manifold) -> manifold3d.Manifold:
-    """The same solid, worked out now.
-
-    Booleans are lazy; one that is used twice before it is worked out may be worked out twice.
-    """
-    solid.num_tri()
-    return solid
-
-
-def _united(solids: list[manifold3d.Manifold]) -> manifold3d.Manifold:
-    import manifold3d
-
-    return _evaluated(manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add))
-
-
-def _less(solid: manifold3d.Manifold, tools: list[manifold3d.Manifold]) -> manifold3d.Manifold:
-    if not tools:
-        return _evaluated(solid)
-    return _evaluated(_evaluated(solid) - _united(tools))
-
-
-def _meeting(
-    tools: list[tuple[int, manifold3d.Manifold]], solid: manifold3d.Manifold
-) -> list[manifold3d.Manifold]:
-    """The tools that take something off a solid: most pass by where a cell is empty."""
-    low, high = _corners(solid)
-    found = []
-    for _, tool in tools:
-        start, end = _corners(tool)
-        if (start < high).all() and (low < end).all() and (solid ^ tool).volume() > 1e-6:
-            found.append(tool)
-    return found
-
-
-def _corners(solid: manifold3d.Manifold) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    box = np.array(solid.bounding_box())
-    return box[:3], box[3:]
-
-
-def _boxes(
-    cells: NDArray[np.int32],
-    halves: list[manifold3d.Manifold],
-    voxel_mm: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Boxes in lattice units that hold all that a groove could meet, struts included."""
-    lows = list((cells - 0.5) * voxel_mm)
-    highs = list((cells + 0.5) * voxel_mm)
-    for half in halves:
-        box = np.array(half.bounding_box())
-        lows.append(box[:3])
-        highs.append(box[3:])
-    return np.array(lows) / voxel_mm, np.array(highs) / voxel_mm
+    return one_piece(cut.name, cells, free, material, halves, voxel_mm, tally)
 
 
 def _cells_of(solid: manifold3d.Manifold, cells: NDArray[np.int32], voxel_mm: float) -> int:
@@ -295,26 +230,3 @@ def _cells_of(solid: manifold3d.Manifold, cells: NDArray[np.int32], voxel_mm: fl
     for cell in cells:
         count += (solid ^ cube.translate(tuple(cell * voxel_mm))).volume() > 0.01
     return int(count)
-
-
-def _protect_zones(
-    index: int,
-    tree: FoldTree,
-    tools: list[tuple[int, manifold3d.Manifold]],
-    own: list[int],
-    size: HingeSize,
-    voxel_mm: float,
-) -> None:
-    """Refuse a groove that would cut into the knuckles of one of the body's own hinges."""
-    for h in own:
-        zone = knuckle_zone(tree.hinges[h], size, voxel_mm)
-        low, high = _corners(zone)
-        for culprit, tool in tools:
-            start, end = _corners(tool)
-            if (start >= high).any() or (low >= end).any():
-                continue
-            if (zone ^ tool).volume() > _ZONE_LOSS_MM3:
-                raise GeometryError(
-                    f"{tree.bodies[index].name}: the barrel of {tree.hinges[culprit].name} passes "
-                    f"through the knuckles of {tree.hinges[h].name} on the folding path"
-                )

@@ -20,12 +20,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.fold.model import Motion
-from fabfold.tree.model import FoldTree
+from fabfold.tree.model import Edge, FoldTree
 
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["Passage", "descendants", "groove_tools", "passages"]
+__all__ = [
+    "SAGITTA_MM",
+    "Passage",
+    "descendants",
+    "distinct",
+    "groove_tools",
+    "inverse",
+    "passages",
+    "step_deg",
+]
 
 #: How far the hull of two placements may fall short of the arc between them, in mm.
 SAGITTA_MM = 0.02
@@ -41,14 +50,17 @@ Floats = NDArray[np.float64]
 class Passage:
     """One way in which a barrel comes past a body, in the body's own frame (its place in A).
 
+    Link plates pass in the same ways (:mod:`fabfold.joinery.plates`).
+
     Attributes
     ----------
     body : int
         The body that it passes.
     hinge : int
-        The hinge whose barrel it is (the first found, if several go the same way).
+        The hinge whose barrel it is (the first found, if several go the same way); of a plate, the
+        index of its link.
     start : (2, 3) float64 array
-        Ends of the lattice edge that carries the barrel, lattice units.
+        Ends of the lattice edge that carries the barrel, lattice units; of a plate, all corners.
     point, direction : (3,) float64 arrays
         Axis of the turn, lattice units; unused if `angle_deg` is 0.
     angle_deg : float
@@ -63,7 +75,7 @@ class Passage:
     angle_deg: float
 
     def placements(self, angles_deg: Floats) -> Floats:
-        """Ends of the barrel's edge at some angles of the turn, shape (a, 2, 3)."""
+        """`start` at some angles of the turn, shape (a, 2, 3)."""
         radians = np.radians(np.asarray(angles_deg, dtype=float))[:, None, None]
         away = self.start - self.point
         along = (away @ self.direction)[:, None] * self.direction
@@ -101,6 +113,14 @@ def passages(tree: FoldTree, motion: Motion, reach: float) -> list[Passage]:
         In a fixed order.
     """
     carried = descendants(tree)
+    # A link's plate lies within a cube about the middle of its face.
+    links = [
+        (index, tree.edges[b.edge]) for index, b in enumerate(tree.bodies) if b.edge is not None
+    ]
+    middles = [(tree.source[edge.parent] + tree.source[edge.child]) / 2.0 for _, edge in links]
+    places = np.concatenate([tree.source.astype(float), np.array(middles).reshape(-1, 3)])
+    owner = np.concatenate([tree.voxel_body, np.array([b for b, _ in links], dtype=np.int32)])
+    apart = {pair for _, edge in links for pair in _one_line(tree, edge)}
     ends = np.array(
         [
             [np.array(h.point) + s * 0.5 * np.array(h.direction, dtype=float) for s in (-1, 1)]
@@ -108,22 +128,17 @@ def passages(tree: FoldTree, motion: Motion, reach: float) -> list[Passage]:
         ]
     ).reshape(-1, 2, 3)
     parents = np.array([h.parent for h in tree.hinges], dtype=int)
-    owner = tree.voxel_body
-    found: dict[tuple[object, ...], Passage] = {}
-
-    def keep(passage: Passage) -> None:
-        found.setdefault(_key(passage), passage)
-
+    found: list[Passage] = []
     zero = np.zeros(3)
     for h, hinge in enumerate(tree.hinges):
-        near = _box_distance(ends[h], tree.source) < reach
+        near = _box_distance(ends[h], places) < reach
         for b in np.unique(owner[near]).tolist():
-            if b not in (hinge.parent, hinge.child):
-                keep(Passage(b, h, ends[h], zero, zero, 0.0))
+            if b not in (hinge.parent, hinge.child) and (h, b) not in apart:
+                found.append(Passage(b, h, ends[h], zero, zero, 0.0))
     for k in range(1, len(motion.angles_deg)):
         poses = tree.body_poses(motion.angles_deg[k - 1])
         placed = _moved(poses[parents], ends)
-        cells = _moved(poses[owner], tree.source[:, None].astype(float))[:, 0]
+        cells = _moved(poses[owner], places[:, None])[:, 0]
         for m in motion.moves[k]:
             turn = float(motion.angles_deg[k, m] - motion.angles_deg[k - 1, m])
             world = poses[parents[m]]
@@ -135,8 +150,10 @@ def passages(tree: FoldTree, motion: Motion, reach: float) -> list[Passage]:
             meets[m] = False
             for h in np.flatnonzero(meets.any(axis=1)).tolist():
                 for b in np.unique(owner[meets[h]]).tolist():
-                    back = _inverse(poses[b])
-                    keep(
+                    if (h, b) in apart:
+                        continue
+                    back = inverse(poses[b])
+                    found.append(
                         Passage(
                             b,
                             h,
@@ -146,7 +163,26 @@ def passages(tree: FoldTree, motion: Motion, reach: float) -> list[Passage]:
                             turn if moving[h] else -turn,
                         )
                     )
-    return _without_covered_rests(list(found.values()))
+    return distinct(found)
+
+
+def _one_line(tree: FoldTree, edge: Edge) -> list[tuple[int, int]]:
+    """Hinges of a double hinge with both axes on one edge, each with the body of the other one.
+
+    They share their knuckles' line, so each half is made for the other's barrels already.
+    """
+    first, second = edge.hinges
+    if tree.hinges[first].point != tree.hinges[second].point:
+        return []
+    return [(first, tree.hinges[second].child), (second, tree.hinges[first].parent)]
+
+
+def distinct(found: list[Passage]) -> list[Passage]:
+    """The passages without those that sweep the same region as another, in their order."""
+    kept: dict[tuple[object, ...], Passage] = {}
+    for passage in found:
+        kept.setdefault(_key(passage), passage)
+    return _without_covered_rests(list(kept.values()))
 
 
 def _moved(poses: Floats, points: Floats) -> Floats:
@@ -154,7 +190,7 @@ def _moved(poses: Floats, points: Floats) -> Floats:
     return np.asarray(np.einsum("nij,nkj->nki", poses[:, :3, :3], points) + poses[:, None, :3, 3])
 
 
-def _box_distance(segment: Floats, cells: NDArray[np.int32]) -> Floats:
+def _box_distance(segment: Floats, cells: Floats) -> Floats:
     """Lower bound of the distance from a segment along an axis to unit cubes, shape (n,)."""
     low, high = segment.min(axis=0), segment.max(axis=0)
     gap = np.maximum(np.maximum(cells - 0.5 - high, low - cells - 0.5), 0.0)
@@ -188,16 +224,16 @@ def _may_meet(
     )
 
 
-def _inverse(pose: Floats) -> Floats:
-    inverse = np.eye(4)
-    inverse[:3, :3] = pose[:3, :3].T
-    inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-    return inverse
+def inverse(pose: Floats) -> Floats:
+    """The rigid transform that undoes another, (4, 4)."""
+    back = np.eye(4)
+    back[:3, :3] = pose[:3, :3].T
+    back[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
+    return back
 
 
 def _segment_key(ends: Floats) -> tuple[tuple[float, ...], ...]:
-    first, second = (tuple((np.round(end, 5) + 0.0).tolist()) for end in ends)
-    return (first, second) if first <= second else (second, first)
+    return tuple(sorted(tuple((np.round(end, 5) + 0.0).tolist()) for end in ends))
 
 
 def _key(passage: Passage) -> tuple[object, ...]:
@@ -305,7 +341,7 @@ def groove_tools(
                 tools.append((passage.hinge, manifold3d.Manifold.hull_points(rod)))
             continue
         arm = _arm(passage)
-        step = _step_deg(passage, arm, voxel_mm)
+        step = step_deg(passage, voxel_mm)
         count = max(1, int(np.ceil(abs(passage.angle_deg) / step)))
         angles = np.linspace(0.0, passage.angle_deg, count + 1)
         # A bound at every step end, widened by the way a point makes in half a step.
@@ -322,20 +358,29 @@ def groove_tools(
     return tools
 
 
-def _step_deg(passage: Passage, arm: float, voxel_mm: float) -> float:
-    """Largest step of a turn whose hulls keep to the bounds on both sides."""
-    sagitta = 1.0 - SAGITTA_MM / max(arm * voxel_mm, 1e-9)
+def step_deg(passage: Passage, voxel_mm: float, excess_mm: float = _EXCESS_MM) -> float:
+    """Largest step of a turn whose hulls keep to the bounds on both sides.
+
+    Parameters
+    ----------
+    passage : Passage
+    voxel_mm : float
+    excess_mm : float
+        How far a hull may go beyond what turns on itself between two placements.
+    """
+    sagitta = 1.0 - SAGITTA_MM / max(_arm(passage) * voxel_mm, 1e-9)
     step = 2.0 * float(np.degrees(np.arccos(max(0.0, sagitta))))
-    way = passage.start[1] - passage.start[0]
-    across = float(np.linalg.norm(way - (way @ passage.direction) * passage.direction))
+    rise = passage.start @ passage.direction
+    flat = passage.start - rise[:, None] * passage.direction
+    across = float(np.linalg.norm(flat - flat[0], axis=1).max())
     if across > 1e-6:
         # The two rods cross like the blades of scissors; the hull closes the gap between them.
-        step = min(step, 2.0 * float(np.degrees(2.0 * _EXCESS_MM / (across * voxel_mm))))
+        step = min(step, 2.0 * float(np.degrees(2.0 * excess_mm / (across * voxel_mm))))
     return min(step, _MAX_STEP_DEG)
 
 
 def _arm(passage: Passage) -> float:
-    """Largest distance of the barrel's edge from the axis of the turn, lattice units."""
+    """Largest distance of what passes from the axis of the turn, lattice units."""
     away = passage.start - passage.point
     across = away - (away @ passage.direction)[:, None] * passage.direction
     return float(np.linalg.norm(across, axis=1).max())

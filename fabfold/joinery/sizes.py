@@ -11,7 +11,7 @@ import numpy as np
 from fabfold.errors import RecipeError
 
 if TYPE_CHECKING:
-    from hinges.mesh import HingeMeshes
+    from hinges.mesh import DoubleHingeMeshes, HingeMeshes
 
 __all__ = ["MIN_WALL_MM", "HingeSize", "hinge_size", "smallest_voxel", "strut_width"]
 
@@ -24,26 +24,71 @@ _DEFAULT_KNUCKLES = 3
 
 @dataclass(frozen=True)
 class HingeSize:
-    """Size of every single hinge of a kit, in mm.
+    """Size of every hinge of a kit, in mm.
 
     Attributes
     ----------
     barrel_radius_mm, pin_radius_mm, clearance_mm : float
     knuckles : int
+    voxel_mm : float
+        Length of the edge.
     meshes : hinges.mesh.HingeMeshes
-        The four pieces in the hinge's own frame.
+        The four pieces of a single hinge in its own frame.
     """
 
     barrel_radius_mm: float
     pin_radius_mm: float
     clearance_mm: float
     knuckles: int
+    voxel_mm: float
     meshes: HingeMeshes
 
     @property
     def reach_mm(self) -> float:
         """Radius of the groove that a barrel needs in any other body."""
         return self.barrel_radius_mm + self.clearance_mm
+
+    def double(self, second: str, turns: tuple[float, float]) -> DoubleHingeMeshes:
+        """The double hinge with barrels of the same radius, its first axis on "+y".
+
+        Both axes on one edge want five knuckles in place of three, which take a thinner pin.
+
+        Parameters
+        ----------
+        second : str
+            Edge of the second axis, as in :func:`hinges.mesh.double_hinge_meshes`.
+        turns : (float, float)
+            90, 180 or 270 degrees each.
+
+        Raises
+        ------
+        hinges.errors.FitError
+            If it does not fit, with the rule that failed.
+        """
+        from hinges.errors import FitError
+        from hinges.mesh import double_hinge_meshes
+
+        knuckles = 5 if second == "+y" else self.knuckles
+        pins = [self.pin_radius_mm]
+        if second == "+y":
+            pins += [float(pin) for pin in np.arange(self.pin_radius_mm - 0.1, 0.75, -0.1)]
+        refusal: FitError | None = None
+        for pin in pins:
+            try:
+                return double_hinge_meshes(
+                    self.voxel_mm,
+                    self.clearance_mm,
+                    "+y",
+                    second,
+                    turns,
+                    barrel_radius_mm=self.barrel_radius_mm,
+                    pin_radius_mm=round(pin, 4),
+                    knuckles=knuckles,
+                    wall_mm=MIN_WALL_MM,
+                )
+            except FitError as error:
+                refusal = refusal or error
+        raise refusal if refusal is not None else ValueError("no pin to try")
 
 
 def strut_width(voxel_mm: float) -> float:
@@ -129,7 +174,14 @@ def _first_fit(
             reason = reason or str(error)
             continue
         return (
-            HingeSize(meshes.barrel_radius_mm, meshes.pin_radius_mm, clearance_mm, count, meshes),
+            HingeSize(
+                meshes.barrel_radius_mm,
+                meshes.pin_radius_mm,
+                clearance_mm,
+                count,
+                voxel_mm,
+                meshes,
+            ),
             "",
         )
     return None, reason

@@ -33,6 +33,8 @@ class Tally:
     crumbs: int = 0
     hollows: int = 0
     filled_mm3: float = 0.0
+    links_cut: int = 0
+    links_mm3: float = 0.0
     struts: int = 0
     strutted: list[str] = field(default_factory=list)
 
