@@ -7,7 +7,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tomlkit
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 
 from fabfold import __version__
 from fabfold.errors import FabfoldError, RecipeError
@@ -17,6 +24,10 @@ from fabfold.targets import is_file_name
 __all__ = ["Recipe", "read_recipe"]
 
 Vector = tuple[float, float, float]
+
+#: Words for numbers.
+_PREFER = {"hinges": 0.0, "balanced": 0.5, "surface": 1.0}
+_VOID = {"inside": 1.0, "even": 0.0, "surface": -1.0}
 
 
 class Recipe(BaseModel):
@@ -63,6 +74,53 @@ class Recipe(BaseModel):
     single_weight: Annotated[float, Field(ge=0, le=100, description="weight of a single hinge")] = (
         0.1
     )
+
+    prefer: Annotated[
+        float,
+        Field(ge=0, le=1, description="0 fewest hinges, 0.5 balanced, 1 best surface"),
+    ] = 0.5
+    void: Annotated[
+        float,
+        Field(ge=-1, le=1, description="empty space: 1 inside the box, -1 at its surface, 0 even"),
+    ] = 0.0
+    keep: Annotated[
+        tuple[str, ...], Field(description="what shall be seen where on the box, WHAT:SIDE")
+    ] = ()
+    keep_weight: Annotated[
+        float, Field(ge=0, le=100, description="energy of a kept face that is elsewhere")
+    ] = 0.3
+    protect: Annotated[
+        tuple[str, ...], Field(description="regions of the model that no cut may cross")
+    ] = ()
+    joints_inside: Annotated[
+        bool, Field(description="no hinge on the visible faces of the box")
+    ] = False
+    pick: Annotated[
+        int, Field(ge=0, le=1000, description="solution of the Pareto list; 0 is the best tree")
+    ] = 0
+
+    @field_validator("prefer", mode="before")
+    @classmethod
+    def _named_preference(cls, value: object) -> object:
+        return _PREFER.get(value, value) if isinstance(value, str) else value
+
+    @field_validator("void", mode="before")
+    @classmethod
+    def _named_void(cls, value: object) -> object:
+        return _VOID.get(value, value) if isinstance(value, str) else value
+
+    @field_validator("keep", "protect")
+    @classmethod
+    def _readable_regions(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        from fabfold.voxels.regions import parse_keep, parse_shape
+
+        texts = tuple(text for text in value if text != "none")
+        for text in texts:
+            if info.field_name == "keep":
+                parse_keep(text, "--keep")
+            else:
+                parse_shape(text, "--protect")
+        return texts
 
     @field_validator("template")
     @classmethod

@@ -12,7 +12,23 @@ if TYPE_CHECKING:
     import manifold3d
     import trimesh
 
-__all__ = ["Solid"]
+__all__ = ["Paint", "Solid"]
+
+
+@dataclass(frozen=True)
+class Paint:
+    """Faces of the model's file that have another colour than most of its surface.
+
+    Attributes
+    ----------
+    corners : (k, 3, 3) float64 array
+        Of each triangle, model units.
+    colours : (k, 3) uint8 array
+        sRGB of each triangle.
+    """
+
+    corners: NDArray[np.float64]
+    colours: NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -31,6 +47,8 @@ class Solid:
         What was repaired or assumed on the way, in a maker's words.
     sha256 : str
         Digest of the input file (of the sample's name and version for samples).
+    paint : Paint or None
+        Painted faces; None where the file has one colour or none.
     """
 
     name: str
@@ -38,6 +56,7 @@ class Solid:
     faces: NDArray[np.int32]
     notes: tuple[str, ...] = field(default=())
     sha256: str = ""
+    paint: Paint | None = None
 
     @property
     def volume(self) -> float:
