@@ -34,7 +34,7 @@ from fabfold.fold.reference import poses, subtree
 from fabfold.fold.sweep import arcs_overlap
 from fabfold.tree.system import HingeSystem
 
-__all__ = ["BRACKET", "Carving", "Meeting", "carved_path", "meetings_on", "plan_carving"]
+__all__ = ["BRACKET", "Carving", "Meeting", "carved_path", "meetings_on", "plan_carving", "skin_of"]
 
 F64 = NDArray[np.float64]
 
@@ -428,7 +428,7 @@ def _choose(
 # --- material ----------------------------------------------------------------------------------
 
 
-def _skin(cells: NDArray[np.int32], material: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def skin_of(cells: NDArray[np.int32], material: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Subvoxels of material within `_SKIN_DEPTH` of the model's outside."""
     from scipy import ndimage
 
@@ -505,7 +505,7 @@ def plan_carving(
         return Carving((), np.zeros((0, 2)), nothing, nothing, ())
     used = sorted({voxel for m in found for voxel in (m.first, m.second)})
     row = {voxel: i for i, voxel in enumerate(used)}
-    skin = _skin(np.asarray(system.cells), material)
+    skin = skin_of(np.asarray(system.cells), material)
     held = _brackets(system, size, bracket)
     weight = np.ones(material.shape, dtype=np.float32)
     middle = np.abs((np.arange(size) + 0.5) / size - 0.5) < CORE

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fabfold.errors import GeometryError
 from fabfold.fold.barrels import first_encounter
 from fabfold.fold.model import Motion
+from fabfold.joinery.carving import Carved, carve
 from fabfold.joinery.cells import eroded_cells, model_manifold
 from fabfold.joinery.cutting import Cut, less, meeting, united
 from fabfold.joinery.grooves import Passage, passages
@@ -46,8 +47,9 @@ def build_bodies(
 
     Each body is the warped model inside its own cells, inset by half the clearance from every cell
     that is not its own, with its hinge halves added, with grooves and pockets wherever the barrel
-    or the link plate of another hinge passes on the folding path, and with struts where the cut
-    left its material in pieces. The link of a double hinge is a body too.
+    or the link plate of another hinge passes on the folding path, with corners rounded off where
+    cells would run into each other, and with struts where the cut left its material in pieces. The
+    link of a double hinge is a body too.
 
     Parameters
     ----------
@@ -74,7 +76,8 @@ def build_bodies(
         If no hinge fits the voxel size and clearance.
     GeometryError
         If this tree cannot be built: a barrel passes through the knuckles of another hinge, a
-        double hinge does not fit, a link is cut apart, or a body cannot be made one piece. The
+        double hinge does not fit, a link is cut apart, cells cannot pass each other without
+        cutting a hinge, or a body cannot be made one piece. The
         message names the bodies.
 
     References
@@ -96,13 +99,24 @@ def build_bodies(
         tree, motion, fitted.plates, voxel_mm=voxel_mm, clearance_mm=clearance_mm
     ):
         plate_ways[passage.body].append(passage)
+    rounded = carve(
+        voxels,
+        tree,
+        motion,
+        model,
+        [[(item.half, item.carve) for item in own] for own in fitted.halves],
+        voxel_mm=voxel_mm,
+        clearance_mm=clearance_mm,
+    )
     tally = Tally()
     origin = voxel_mm * (0.5 - tree.source.min(axis=0).astype(float))
     meshes = []
     for index, body in enumerate(tree.bodies):
         told.update(index / len(tree.bodies), f"cutting {body.name}")
         cut = Cut(index, tree, fitted, ways[index], plate_ways[index], size, voxel_mm)
-        solid = link_body(cut, tally) if index in fitted.plates else _body(cut, model, tally)
+        solid = (
+            link_body(cut, tally) if index in fitted.plates else _body(cut, model, rounded, tally)
+        )
         vertices, faces = finish_mesh(solid, body.name, origin)
         meshes.append(BodyMesh(body.name, vertices, faces))
     told.update(1.0, f"{len(meshes)} bodies, {tally.struts} struts")
@@ -119,7 +133,10 @@ def build_bodies(
         carved_mm3=round(tally.carved_mm3, 3),
         dropped_mm3=round(tally.dropped_mm3, 3),
         struts=tally.struts,
-        notes=_notes(tally, voxel_mm, len(fitted.plates)),
+        notes=(*rounded.notes(), *_notes(tally, voxel_mm, len(fitted.plates))),
+        rounded_cells=rounded.cells,
+        rounded_skin_mm3=round(rounded.skin_mm3, 3),
+        rounded_inside_mm3=round(rounded.inside_mm3, 3),
     )
 
 
@@ -192,14 +209,17 @@ def _refuse_encounters(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm
         )
 
 
-def _body(cut: Cut, model: manifold3d.Manifold, tally: Tally) -> manifold3d.Manifold:
+def _body(
+    cut: Cut, model: manifold3d.Manifold, rounded: Carved, tally: Tally
+) -> manifold3d.Manifold:
     """One body as one connected solid, lattice origin at zero."""
     voxel_mm, size = cut.voxel_mm, cut.size
     cells = cut.tree.source[list(cut.tree.bodies[cut.index].voxels)]
     room = eroded_cells(cells, voxel_mm, size.clearance_mm / 2)
     own = cut.fitted.halves[cut.index]
     carves = [item.carve for item in own]
-    material = less(model ^ room, carves)
+    rounds = rounded.tools.get(cut.index, [])
+    material = less(model ^ room, [*carves, *rounds])
     halves = [
         less(item.half, [other.carve for other in own if other.hinge != item.hinge]) for item in own
     ]
@@ -213,10 +233,11 @@ def _body(cut: Cut, model: manifold3d.Manifold, tally: Tally) -> manifold3d.Mani
         if volume > 0.01:
             tally.carved_mm3 += volume
             tally.carved_cells += _cells_of(lost, cells, voxel_mm)
-    halves = [cut.half(half, grooves, pockets) for half in halves]
+    halves = [less(cut.half(half, grooves, pockets), rounds) for half in halves]
 
     def free() -> manifold3d.Manifold:
-        return less(room, [*carves, *(tool for _, tool in (*grooves, *pockets))])
+        shut = [*rounds, *rounded.shut.get(cut.index, [])]
+        return less(room, [*carves, *shut, *(tool for _, tool in (*grooves, *pockets))])
 
     return one_piece(cut.name, cells, free, material, halves, voxel_mm, tally)
 

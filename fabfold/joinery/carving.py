@@ -16,13 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.fold.carving import Carving, Meeting, plan_carving
+from fabfold.fold.carving import Carving, Meeting, plan_carving, skin_of
 from fabfold.fold.model import Motion
 from fabfold.joinery.cells import eroded_cells, occupancy
 from fabfold.tree.model import FoldTree
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
     Solids = list[manifold3d.Manifold]
 
-__all__ = ["Carved", "carve", "quarter_path", "rounds_of"]
+__all__ = ["Carved", "carve", "quarter_path"]
 
 #: Rings and slabs in the side of a voxel.
 _RINGS, _SLABS = 80, 10
@@ -78,11 +79,13 @@ class Carved:
         """All that is lost."""
         return self.skin_mm3 + self.inside_mm3
 
-    def note(self) -> str:
+    def notes(self) -> tuple[str, ...]:
         """What was done, in a maker's words."""
+        if not self.cells:
+            return ()
         return (
             f"corners of {self.cells} cells rounded off so that they pass each other: "
-            f"{self.skin_mm3:.0f} mm³ at the model's surface, {self.inside_mm3:.0f} mm³ inside"
+            f"{self.skin_mm3:.0f} mm³ at the model's surface, {self.inside_mm3:.0f} mm³ inside",
         )
 
 
@@ -216,7 +219,7 @@ class _Bench:
             to[:, 3] *= self.voxel_mm
         voxels = (meeting.first, meeting.second)
         corners = [
-            np.rint(to[:, :3] @ self.tree.source[v] + to[:, 3] / self.voxel_mm - 0.5)
+            np.rint(2.0 * (to[:, :3] @ self.tree.source[v] + to[:, 3] / self.voxel_mm)) / 2.0 - 0.5
             for to, v in zip(frames, voxels, strict=True)
         ]
         rings = _common_rings(corners[0], corners[1]) * self.voxel_mm
@@ -296,8 +299,6 @@ class _Bench:
             out.shut.setdefault(int(self.body[voxel]), []).append(tool)
 
     def _count(self, out: Carved) -> None:
-        from fabfold.fold.carving import skin_of
-
         skin = None
         size = self.voxels.subvoxels.shape[1]
         step = self.voxel_mm / size
@@ -315,11 +316,6 @@ class _Bench:
             out.cells += 1
             out.skin_mm3 += share * volume
             out.inside_mm3 += (1.0 - share) * volume
-
-
-def rounds_of(carved: Carved, body: int) -> Solids:
-    """The tools of a body as one list, empty where it is whole."""
-    return carved.tools.get(body, [])
 
 
 # --- rings and slabs ---------------------------------------------------------------------------
@@ -355,7 +351,7 @@ def _slabs(parts: Solids, frame: Floats, level: Floats) -> list[Floats]:
     """Edges, seen along the axis, of what lies between each two levels: (k, 2, 2) each."""
     placed = [part.transform(frame) for part in parts]
     out = []
-    for low, high in zip(level[:-1], level[1:], strict=True):
+    for low, high in pairwise(level):
         edges = [np.zeros((0, 2, 2))]
         for part in placed:
             box = part.bounding_box()

@@ -65,6 +65,10 @@ class Joinery:
         Bars added inside cells to join material that the cut left apart.
     notes : tuple of str
         What else was done, in a maker's words.
+    rounded_cells : int
+        Cells that lost corners so that they pass each other on the folding path.
+    rounded_skin_mm3, rounded_inside_mm3 : float
+        What they lost, at the model's surface and inside it.
     """
 
     bodies: tuple[BodyMesh, ...]
@@ -79,3 +83,6 @@ class Joinery:
     dropped_mm3: float = 0.0
     struts: int = 0
     notes: tuple[str, ...] = field(default=())
+    rounded_cells: int = 0
+    rounded_skin_mm3: float = 0.0
+    rounded_inside_mm3: float = 0.0
