@@ -44,8 +44,15 @@ TemplateName = Annotated[
     typer.Option(
         "--template",
         "-t",
-        help="Target shape: box-AxBxC, a name of 'fabfold list templates', or a .toml file. "
-        "Default: the sample's own, else box-4x4x4.",
+        help="Target shape: box-AxBxC, a name of 'fabfold list templates', a .toml file, or a "
+        "mesh. Default: the sample's own, else box-4x4x4.",
+    ),
+]
+TemplateCells = Annotated[
+    int | None,
+    typer.Option(
+        "--template-cells",
+        help="Cells of a target that is a mesh. Default: the best match from 32 to 128.",
     ),
 ]
 VoxelMm = Annotated[
@@ -98,6 +105,25 @@ Workers = Annotated[
         "--workers", "-j", help="Processes of the search. Default: one a core. Changes no result."
     ),
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="tcp://HOST:PORT",
+        help="Search on the workers of this Dask scheduler instead. Changes no result.",
+    ),
+]
+Time = Annotated[
+    float | None,
+    typer.Option(
+        "--time",
+        metavar="SECONDS",
+        min=0,
+        help="Search for so long, then go on with the best so far; 0 takes what earlier runs left. "
+        "The result depends on how fast the machine is; without this option it never does.",
+        show_default=False,
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")]
 
 
@@ -133,7 +159,7 @@ def _triple(text: str | None, option: str) -> tuple[float, float, float] | None:
     return (x, y, z)
 
 
-def _kit(source: str, output: Path | None, workers: int | None, quiet: bool, **options: Any) -> Kit:
+def _kit(source: str, output: Path | None, quiet: bool, **options: Any) -> Kit:
     from fabfold.console import ConsoleListener
     from fabfold.kit import open_kit
 
@@ -141,7 +167,7 @@ def _kit(source: str, output: Path | None, workers: int | None, quiet: bool, **o
         options[name] = _triple(options[name], f"--{name}")
     if output is None and not (Path(source).is_dir() or source.endswith(".toml")):
         output = Path(f"{Path(source.removeprefix('sample:')).stem}-kit")
-    kit = open_kit(source, folder=output, workers=workers, **options)
+    kit = open_kit(source, folder=output, **options)
     if not quiet:
         kit.listener = ConsoleListener()
     return kit
@@ -154,6 +180,7 @@ def _stage(name: str, summary: str) -> None:
         source: Source,
         output: Output = None,
         template: TemplateName = None,
+        template_cells: TemplateCells = None,
         voxel_mm: VoxelMm = None,
         profile: ProfileName = None,
         clearance_mm: ClearanceMm = None,
@@ -165,11 +192,14 @@ def _stage(name: str, summary: str) -> None:
         origin: Origin = None,
         pitch: Pitch = None,
         workers: Workers = None,
+        scheduler: Scheduler = None,
+        time: Time = None,
         quiet: Quiet = False,
     ) -> None:
         options = dict(locals())
         for key in ("name", "summary"):
             options.pop(key, None)
+        options["seconds"] = options.pop("time")
         kit = _kit(**options)
         kit.run(name)
         from fabfold.console import show_result

@@ -13,7 +13,8 @@
     │   ├── NoTreeError              no tree fits the template                  3
     │   └── NoFoldError              trees fit, but none could be folded        3
     ├── CheckError                   a finished kit failed one of its checks    1
-    └── GeometryError                a geometric construction failed            1
+    ├── GeometryError                a geometric construction failed            1
+    └── WorkerError                  processes or a cluster failed the search   1
 
 Every message says what is wrong, where, and what to do about it.
 """
@@ -33,6 +34,7 @@ __all__ = [
     "NoVoxelsError",
     "RecipeError",
     "TemplateError",
+    "WorkerError",
 ]
 
 
@@ -94,3 +96,7 @@ class CheckError(FabfoldError):
 
 class GeometryError(FabfoldError):
     """A geometric construction gave no valid solid."""
+
+
+class WorkerError(FabfoldError):
+    """The worker processes or the cluster cannot go on with the search."""

@@ -26,10 +26,11 @@ from fabfold.errors import (
     NoFoldError,
 )
 from fabfold.files import sha256_of, write_bytes, write_text
-from fabfold.lattice import Template, load_template, rotation_about
+from fabfold.lattice import Template, rotation_about
 from fabfold.progress import Listener, Progress, SilentListener
 from fabfold.recipe import Recipe, make_recipe, read_recipe
 from fabfold.store import StageStore, stage_key
+from fabfold.targets import find_input, is_file_name, load_target, named_target
 
 if TYPE_CHECKING:
     from fabfold.printing.checks import Check
@@ -53,10 +54,16 @@ class Kit:
         Every choice that the result depends on.
     model : Path or None
         The model's file; None for a sample.
+    template : Path or None
+        The template's file; None for a box or a shipped template.
     folder : Path or None
         Kit folder that keeps finished stages; None works in memory until :meth:`export`.
     workers : int or None
         Processes of the search; None takes one a core. Changes no result.
+    scheduler : str or None
+        Address of a Dask scheduler, whose workers search instead. Changes no result.
+    seconds : float or None
+        Search for so long and take the best that was found; depends on the machine's speed.
 
     Examples
     --------
@@ -71,17 +78,23 @@ class Kit:
         recipe: Recipe,
         *,
         model: Path | None = None,
+        template: Path | None = None,
         folder: Path | None = None,
         workers: int | None = None,
+        scheduler: str | None = None,
+        seconds: float | None = None,
     ) -> None:
         self.recipe = recipe
         self.folder = folder
         self.workers = workers
+        self.scheduler = scheduler
+        self.seconds = seconds
         self.listener: Listener = SilentListener()
         self._model = model
         self._store = StageStore(folder)
         self._results: dict[str, Any] = {}
-        self._template: Template = load_template(recipe.template)
+        self._template_file = template
+        self._template: Template = load_target(recipe.template, template, recipe.template_cells)
         if folder is not None:
             _claim(folder)
 
@@ -92,6 +105,8 @@ class Kit:
         *,
         folder: str | Path | None = None,
         workers: int | None = None,
+        scheduler: str | None = None,
+        seconds: float | None = None,
         **options: Any,
     ) -> Kit:
         """Kit of a model file or ``sample:NAME``; `options` are the fields of the recipe.
@@ -104,7 +119,12 @@ class Kit:
             If an option is wrong.
         """
         return open_kit(
-            str(model), folder=None if folder is None else Path(folder), workers=workers, **options
+            str(model),
+            folder=None if folder is None else Path(folder),
+            workers=workers,
+            scheduler=scheduler,
+            seconds=seconds,
+            **options,
         )
 
     # Stages -----------------------------------------------------------------------------------
@@ -118,7 +138,7 @@ class Kit:
             progress.update(None, self.recipe.model)
             source: str | Path = self.recipe.model
             if self._model is not None:
-                source = self._keep_model(self._model)
+                source = self._keep(self._model, self.recipe.sha256, "model")
             solid = load.load_solid(source)
             progress.update(1.0, f"{len(solid.faces)} triangles")
             return solid
@@ -157,6 +177,8 @@ class Kit:
 
     def fit(self) -> list[Candidate]:
         """Trees that fold, best first (paper section 4), of the first round that finds any.
+
+        With a budget in seconds, the best of all rounds that there is time for.
 
         Raises
         ------
@@ -249,6 +271,10 @@ class Kit:
         checks = self.check()
         with self.listener.stage("export") as progress:
             write_kit(target, self.recipe, profile, self.solid(), made, checks, progress)
+        if target != self.folder:
+            if self._model is not None:
+                self._keep(self._model, self.recipe.sha256, "model", StageStore(target))
+            self._keep_template(StageStore(target))
         return target
 
     def run(self, stage: str) -> None:
@@ -279,21 +305,26 @@ class Kit:
             profile = profile.model_copy(update={"clearance_mm": self.recipe.clearance_mm})
         return profile
 
-    def _keep_model(self, model: Path) -> Path:
-        """Copy the model into the kit, so that ``kit.toml`` alone can make the kit again."""
-        if self._store.folder is None:
-            return model
-        kept = self._store.path("model") / self.recipe.model
-        if not (kept.is_file() and sha256_of(kept) == self.recipe.sha256):
-            write_bytes(kept, model.read_bytes())
+    def _keep(self, file: Path, sha256: str, where: str, store: StageStore | None = None) -> Path:
+        """Copy an input into a kit, so that ``kit.toml`` alone can make the kit again."""
+        store = store or self._store
+        if store.folder is None:
+            return file
+        kept = store.path(where) / file.name
+        if not (kept.is_file() and sha256_of(kept) == sha256):
+            write_bytes(kept, file.read_bytes())
         return kept
+
+    def _keep_template(self, store: StageStore | None = None) -> None:
+        if self._template_file is not None:
+            self._keep(self._template_file, self.recipe.template_sha256, "template", store)
 
     def _voxels_key(self) -> str:
         recipe = self.recipe
         return stage_key(
             __version__,
             recipe.sha256 or recipe.model,
-            self._template.cells.tolist(),
+            self._template.content,
             recipe.seed,
             [recipe.rotation, recipe.origin, recipe.pitch, recipe.drop_below],
         )
@@ -305,6 +336,7 @@ class Kit:
             [recipe.surface_weight, recipe.single_weight, recipe.effort, recipe.rounds],
             recipe.voxel_mm,
             profile.model_dump(mode="json"),
+            self._rounds().mark(),
         )
 
     def _rounds(self) -> Rounds:
@@ -319,6 +351,8 @@ class Kit:
                 store=self._store,
                 workers=self.workers,
                 listening=self._listening,
+                scheduler=self.scheduler,
+                seconds=self.seconds,
             )
         result: Rounds = self._results["rounds"]
         return result
@@ -361,6 +395,7 @@ class Kit:
         """Progress of a stage that is about to be made; the recipe is written before the first."""
         if self.folder is not None:
             write_text(self.folder / "kit.toml", self.recipe.to_toml())
+            self._keep_template()
         return self.listener.stage(name)
 
     def _stage(
@@ -387,7 +422,13 @@ class Kit:
 
 
 def open_kit(
-    source: str, *, folder: Path | None = None, workers: int | None = None, **options: Any
+    source: str,
+    *,
+    folder: Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    seconds: float | None = None,
+    **options: Any,
 ) -> Kit:
     """Kit of a model file, ``sample:NAME``, a ``kit.toml`` or a kit folder.
 
@@ -397,6 +438,8 @@ def open_kit(
     folder : Path or None
         Kit folder; for a kit folder or its ``kit.toml`` the default is that folder.
     workers : int or None
+    scheduler : str or None
+    seconds : float or None
     **options
         Fields of the recipe; those that are None keep the recipe's or the default value.
 
@@ -408,41 +451,46 @@ def open_kit(
         If the recipe or an option is wrong.
     """
     given = {key: value for key, value in options.items() if value is not None}
+    template: Path | None = None
+    if "template" in given:
+        fields, template = named_target(str(given["template"]))
+        given.update(fields)
     path = Path(source)
     if path.is_dir():
         if not (path / "kit.toml").is_file():
             raise KitError(f"{path}: a folder without kit.toml is no kit; give a model file")
         path = path / "kit.toml"
+    model: Path | None = None
     if path.suffix == ".toml":
         folder = path.parent if folder is None else folder
         recipe = read_recipe(path)
+        if template is None and "template" not in given and is_file_name(recipe.template):
+            template = find_input(recipe.template, recipe.template_sha256, path.parent, "template")
+            given.update(named_target(str(template))[0])
+        elif "template" in given and "template_cells" not in given:
+            given["template_cells"] = None
         recipe = make_recipe(**{**recipe.model_dump(), **given})
-        model = _find_model(recipe, path.parent)
+        if not recipe.model.startswith("sample:"):
+            model = find_input(recipe.model, recipe.sha256, path.parent, "model")
     elif source.startswith("sample:"):
         from fabfold.solid.samples import sample
 
         given.setdefault("template", sample(source.removeprefix("sample:")).template)
-        recipe, model = make_recipe(model=source, **given), None
+        recipe = make_recipe(model=source, **given)
     else:
         if not path.is_file():
             raise ModelError(f"{source}: no such file (built-in samples are written sample:NAME)")
         given.setdefault("template", "box-4x4x4")
         recipe = make_recipe(model=path.name, sha256=sha256_of(path), **given)
         model = path
-    return Kit(recipe, model=model, folder=folder, workers=workers)
-
-
-def _find_model(recipe: Recipe, beside: Path) -> Path | None:
-    """Model file of a recipe: beside it, kept in its stages, or in the working folder."""
-    if recipe.model.startswith("sample:"):
-        return None
-    for place in (beside, beside / "stages" / "model", Path()):
-        path = place / recipe.model
-        if path.is_file() and sha256_of(path) == recipe.sha256:
-            return path
-    raise ModelError(
-        f"{recipe.model}: not found with the digest {recipe.sha256[:12]}… beside the recipe in "
-        f"{beside} or in the working folder; put the model's file there"
+    return Kit(
+        recipe,
+        model=model,
+        template=template,
+        folder=folder,
+        workers=workers,
+        scheduler=scheduler,
+        seconds=seconds,
     )
 
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
+from itertools import groupby
+from typing import Any
 
 from fabfold.errors import NoFoldError, NoTreeError
 from fabfold.fold.foldability import LatticeFoldability
 from fabfold.lattice import Template
-from fabfold.progress import Progress, SilentProgress
+from fabfold.progress import Progress
 from fabfold.recipe import Recipe
-from fabfold.search import SeedResult, search
-from fabfold.stagefiles import load_seed, save_seed
+from fabfold.search import Budget, Tally, best_first, executor, run_seeds, search
+from fabfold.seeds import Event, Job, SeedResult
+from fabfold.shelf import Shelf
 from fabfold.store import StageStore, stage_key
 from fabfold.tree.effort import EFFORTS
 from fabfold.tree.problem import Weights, from_features
@@ -56,6 +59,11 @@ class Rounds:
     workers : int or None
     listening : callable
         Opens the progress of a round by its name.
+    scheduler : str or None
+        Address of a Dask scheduler whose workers run the seeds.
+    seconds : float or None
+        Search for so long, round after round, and rank all that was found; 0 takes what earlier
+        runs left. None searches round by round, each to its end.
     """
 
     def __init__(
@@ -68,15 +76,20 @@ class Rounds:
         store: StageStore,
         workers: int | None,
         listening: Callable[[str], AbstractContextManager[Progress]],
+        scheduler: str | None = None,
+        seconds: float | None = None,
     ) -> None:
         self.recipe = recipe
         self.template = template
         self.options = _in_order(options, len(template))
         self.workers = workers
+        self.scheduler = scheduler
+        self.seconds = seconds
         self._key = key
-        self._store = store
+        self._shelf = Shelf(store)
         self._listening = listening
         self._done: dict[int, list[Candidate]] = {}
+        self._ranked: list[tuple[Voxels, Candidate]] | None = None
 
     @property
     def seeds_per_round(self) -> int:
@@ -86,6 +99,8 @@ class Rounds:
     def found(self) -> Iterator[tuple[Voxels, list[Candidate]]]:
         """Rounds that found trees that fold, with the voxelization that they join.
 
+        With a budget in seconds, the trees of all rounds best first instead.
+
         Raises
         ------
         NoTreeError
@@ -93,19 +108,23 @@ class Rounds:
         NoFoldError
             At the end, if trees fitted but none folded.
         """
+        if self.seconds is not None:
+            for _, group in groupby(self.ranked(self.seconds), key=lambda pair: id(pair[0])):
+                pairs = list(group)
+                yield pairs[0][0], [candidate for _, candidate in pairs]
+            return
         fits = found = False
         why = ""
         for number in range(self.recipe.rounds):
-            voxels = self.options[number % len(self.options)]
             try:
-                candidates = self._round(number, voxels)
+                candidates = self._round(number)
             except NoTreeError as error:
                 why = why or str(error)
                 continue
             fits = True
             if candidates:
                 found = True
-                yield voxels, candidates
+                yield self._voxels(number), candidates
         if not fits:
             raise NoTreeError(why)
         if not found:
@@ -114,42 +133,127 @@ class Rounds:
                 "seeds; try --effort thorough, more --rounds, another --seed or a larger template"
             )
 
-    def _round(self, number: int, voxels: Voxels) -> list[Candidate]:
+    def mark(self) -> list[Any]:
+        """What later stages depend on besides the recipe: the ranking, where the clock made it."""
+        if self.seconds is None:
+            return []
+        return [
+            [candidate.tree.to_json(1.0, (0.0, 0.0, 0.0)), candidate.path.tolist()]
+            for _, candidate in self.ranked(self.seconds)
+        ]
+
+    def ranked(self, seconds: float) -> list[tuple[Voxels, Candidate]]:
+        """Every tree that folds, best first, found in `seconds` or in earlier runs.
+
+        Raises
+        ------
+        NoFoldError
+            If nothing folds yet.
+        """
+        if self._ranked is None:
+            results = self._search_for(seconds)
+            count = self.seeds_per_round
+            first = self._seeds(0)[0]
+            pairs = [
+                (self._voxels((seed - first) // count), candidate)
+                for seed in sorted(results)
+                for candidate in results[seed].candidates
+            ]
+            self._ranked = sorted(pairs, key=lambda pair: pair[1].energy["total"])
+            if results and not any(result.fits for result in results.values()):
+                raise NoTreeError(results[min(results)].why)
+        if not self._ranked:
+            raise NoFoldError(
+                f"nothing folds yet after {seconds:g} s; what is done is kept: the same command "
+                "with a longer --time goes on from there, without --time each seed runs to its end"
+            )
+        return self._ranked
+
+    def _search_for(self, seconds: float) -> dict[int, SeedResult]:
+        """Results of all rounds that there is time for, and of earlier runs."""
+        keys: dict[int, str] = {}
+        known: dict[int, SeedResult] = {}
+        rounds = SEED_STRIDE // self.seeds_per_round
+        for number in range(rounds):
+            fresh = self._keys(number)
+            held = self._shelf.known(fresh)
+            if not held:
+                break
+            keys |= fresh
+            known |= held
+
+        def tasks() -> Iterator[tuple[int, Job]]:
+            for number in range(rounds):
+                tally.check_failures()
+                keys.update(self._keys(number))
+                job: Job | None = None
+                for seed in self._seeds(number):
+                    cut = known[seed].cut if seed in known else 0.0
+                    # With no more time than it had before, a seed would not come further.
+                    if cut is not None and cut < seconds:
+                        job = job or self._job(number)
+                        yield seed, job
+
+        if seconds <= 0:
+            return known
+        with self._listening("fit") as progress:
+            budget = Budget(seconds)
+            tally = Tally(progress, known, lambda _done: budget.share)
+            with executor(self.workers, self.scheduler, rounds, budget.over) as pool:
+
+                def hear(event: Event) -> None:
+                    tally.hear(self._shelf.keep(event, keys[event.seed], seconds))
+
+                run_seeds(pool, tasks(), hear, budget.over)
+        tally.check_failures()
+        return tally.results
+
+    def _voxels(self, number: int) -> Voxels:
+        return self.options[number % len(self.options)]
+
+    def _seeds(self, number: int) -> range:
+        count = self.seeds_per_round
+        first = self.recipe.seed * SEED_STRIDE + number * count
+        return range(first, first + count)
+
+    def _keys(self, number: int) -> dict[int, str]:
+        """Digest of all that each seed of a round depends on."""
+        recipe = self.recipe
+        about = [recipe.surface_weight, recipe.single_weight, recipe.effort, number]
+        return {seed: stage_key(self._key, *about, seed) for seed in self._seeds(number)}
+
+    def _job(self, number: int) -> Job:
+        voxels = self._voxels(number)
+        weights = Weights(surface=self.recipe.surface_weight, single=self.recipe.single_weight)
+        problem = from_features(voxels, features(voxels), self.template, weights)
+        return Job(problem, LatticeFoldability(), EFFORTS[self.recipe.effort])
+
+    def _round(self, number: int) -> list[Candidate]:
         if number in self._done:
             return self._done[number]
-        recipe = self.recipe
-        count = self.seeds_per_round
-        first = recipe.seed * SEED_STRIDE + number * count
-        seeds = range(first, first + count)
-        weights = Weights(surface=recipe.surface_weight, single=recipe.single_weight)
-        about = [recipe.surface_weight, recipe.single_weight, recipe.effort, number]
-        keys = {seed: stage_key(self._key, *about, seed) for seed in seeds}
+        keys = self._keys(number)
         known = {
-            seed: load_seed(self._store, seed)
-            for seed in seeds
-            if self._store.holds(f"seed-{seed}", keys[seed])
+            seed: result for seed, result in self._shelf.known(keys).items() if result.cut is None
         }
 
-        def keep(seed: int, result: SeedResult) -> None:
-            if self._store.folder is not None:
-                self._store.record(f"seed-{seed}", keys[seed], save_seed(self._store, seed, result))
+        def hear(event: Event) -> None:
+            self._shelf.keep(event, keys[event.seed])
 
-        def run(progress: Progress) -> list[Candidate]:
-            return search(
-                from_features(voxels, features(voxels), self.template, weights),
-                seeds,
-                LatticeFoldability(),
-                EFFORTS[recipe.effort],
-                workers=self.workers,
-                progress=progress,
-                known=known,
-                on_result=keep,
-            )
-
-        if len(known) == len(seeds):
-            candidates = run(SilentProgress())
+        if len(known) == len(keys):
+            candidates = best_first(self._seeds(number), known)
         else:
             with self._listening(f"fit-{number}") as progress:
-                candidates = run(progress)
+                job = self._job(number)
+                candidates = search(
+                    job.problem,
+                    self._seeds(number),
+                    job.foldability,
+                    job.effort,
+                    workers=self.workers,
+                    scheduler=self.scheduler,
+                    progress=progress,
+                    known=known,
+                    hear=hear,
+                )
         self._done[number] = candidates
         return candidates

@@ -1,64 +1,240 @@
-"""Run the tree search for many seeds, in this process or over worker processes.
+"""Run the tree search for many seeds: in worker processes here, or on a cluster.
 
 The answer depends on the problem, the seeds and the effort alone: every seed is a task of its own,
-and the results are merged in the order of the seeds, whichever worker finished first.
+and the results are merged in the order of the seeds, whichever worker finished first. Only a
+budget in seconds makes it depend on the machine.
 """
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
-from fabfold.errors import NoFoldError, NoTreeError
+from fabfold.errors import NoTreeError, RecipeError, WorkerError
 from fabfold.progress import Progress, SilentProgress
+from fabfold.seeds import Better, Done, Event, Executor, Job, SeedResult
 from fabfold.tree.effort import Effort
 from fabfold.tree.foldability import Foldability
 from fabfold.tree.problem import TreeProblem
-from fabfold.tree.solve import Candidate, solve
+from fabfold.tree.solve import Candidate
 
-__all__ = ["SeedResult", "search"]
+__all__ = ["Budget", "SeedResult", "Tally", "best_first", "executor", "run_seeds", "search"]
 
-#: Times that a seed may take its worker down before it is left out.
-TRIES = 2
+#: Workers that a seed may take down before it is left out.
+TRIES = 3
+#: Seconds between looks at the budget.
+TICK = 0.5
+#: Seconds that seeds have to end after the budget is over.
+GRACE = 20.0
 
 
-@dataclass(frozen=True)
-class SeedResult:
-    """What one seed found.
+class Budget:
+    """Seconds that a search may take, counted from the start of this object.
 
-    Attributes
+    Parameters
     ----------
-    candidates : tuple of Candidate
-        Trees that fold, best first; empty where none was found.
-    fits : bool
-        Whether any tree fitted the template, folding or not.
-    why : str
-        What the search said where it found nothing.
+    seconds : float or None
+        None is without end.
     """
 
-    candidates: tuple[Candidate, ...]
-    fits: bool = True
-    why: str = ""
+    def __init__(self, seconds: float | None = None) -> None:
+        self.seconds = seconds
+        self._start = time.monotonic()
+
+    @property
+    def share(self) -> float:
+        """How much of it is used, from 0 to 1."""
+        if self.seconds is None:
+            return 0.0
+        if self.seconds <= 0:
+            return 1.0
+        return min(1.0, (time.monotonic() - self._start) / self.seconds)
+
+    def over(self) -> bool:
+        """Whether it is used up."""
+        return self.share >= 1.0
 
 
-def _task(problem: TreeProblem, seed: int, foldability: Foldability, effort: Effort) -> SeedResult:
+@contextmanager
+def executor(
+    workers: int | None, scheduler: str | None, seeds: int, over: Callable[[], bool]
+) -> Iterator[Executor]:
+    """Open what runs the seeds; nothing runs any more when the context closes.
+
+    Parameters
+    ----------
+    workers : int or None
+        Processes on this machine; None is one a core. With one, seeds run in this process, where
+        nothing guards it against a seed that crashes.
+    scheduler : str or None
+        Address of a Dask scheduler; its workers run the seeds then.
+    seeds : int
+        Seeds that there may be to run.
+    over : callable
+        Whether the seeds that run shall end.
+
+    Raises
+    ------
+    RecipeError
+        If the number of workers or the address is wrong, or the cluster cannot be used.
+    """
+    opened: Executor
+    if workers is not None and workers < 1:
+        raise RecipeError(f"--workers {workers}: there must be at least one")
+    if scheduler is not None:
+        from fabfold.cluster import Cluster
+
+        opened = Cluster(scheduler)
+    elif workers == 1:
+        from fabfold.workers import Here
+
+        opened = Here(over)
+    else:
+        from fabfold.workers import Processes
+
+        opened = Processes(min(workers or os.cpu_count() or 1, max(1, seeds)))
     try:
-        return SeedResult(tuple(solve(problem, seed, foldability, effort)))
-    except NoFoldError as error:
-        return SeedResult((), why=str(error))
-    except NoTreeError as error:
-        return SeedResult((), fits=False, why=str(error))
+        yield opened
+    finally:
+        opened.close()
 
 
-def _leave_signals_to_parent() -> None:
-    # Ctrl-C reaches the whole process group; the parent decides what is kept and ends the workers.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+def run_seeds(
+    pool: Executor,
+    tasks: Iterable[tuple[int, Job]],
+    hear: Callable[[Event], None],
+    over: Callable[[], bool],
+) -> None:
+    """Run seeds until all have ended, or `over` says so.
+
+    A seed whose worker dies is tried again, and left out after `TRIES` workers; the others do not
+    notice. Seeds that run when it is over end early; those that do not end in time are given up,
+    and what they had told counts.
+
+    Parameters
+    ----------
+    pool : Executor
+    tasks : iterable of (int, Job)
+        Taken as workers become free; may be endless.
+    hear : callable
+        Told of each :class:`Better` and each :class:`Done`.
+    over : callable
+        Polled often.
+    """
+    waiting = iter(tasks)
+    again: list[tuple[int, Job]] = []
+    running: dict[int, Job] = {}
+    best: dict[int, Candidate] = {}
+    losses: Counter[int] = Counter()
+
+    def sift(event: Event) -> None:
+        if event.seed not in running:
+            return
+        if isinstance(event, Better):
+            best[event.seed] = event.candidate
+            hear(event)
+        elif isinstance(event, Done):
+            del running[event.seed]
+            hear(event)
+        else:
+            job = running.pop(event.seed)
+            losses[event.seed] += 1
+            if losses[event.seed] < TRIES:
+                again.append((event.seed, job))
+            else:
+                why = f"seed {event.seed} took its worker down {TRIES} times"
+                hear(Done(event.seed, SeedResult((), why=why, failed=True)))
+
+    told: Budget | None = None
+    while True:
+        if told is None and over():
+            pool.stop()
+            told = Budget(GRACE)
+        while told is None and pool.free() > 0:
+            task = again.pop(0) if again else next(waiting, None)
+            if task is None:
+                break
+            running[task[0]] = task[1]
+            pool.submit(task[1], task[0])
+        if not running and (told is not None or not again):
+            break
+        if told is not None and told.over():
+            break
+        pool.wait(sift, TICK)
+    for seed in [*running, *(seed for seed, _ in again)]:
+        found = (best[seed],) if seed in best else ()
+        hear(Done(seed, SeedResult(found, why="no time left", cut=0.0)))
+
+
+class Tally:
+    """Results so far, and the line of progress that tells of them.
+
+    Parameters
+    ----------
+    progress : Progress
+    known : mapping of int to SeedResult
+        Seeds that are done already.
+    share : callable
+        How far the search is, from 0 to 1, of the number of seeds that are done.
+    total : int or None
+        Seeds in all, where that is known.
+    """
+
+    def __init__(
+        self,
+        progress: Progress,
+        known: Mapping[int, SeedResult],
+        share: Callable[[int], float],
+        total: int | None = None,
+    ) -> None:
+        self.results = dict(known)
+        self.best = min(
+            (c for result in known.values() for c in result.candidates),
+            key=lambda c: c.energy["total"],
+            default=None,
+        )
+        self._progress, self._share, self._total = progress, share, total
+        self.tell()
+
+    def hear(self, event: Event) -> None:
+        """Count an event in."""
+        found: Sequence[Candidate] = ()
+        if isinstance(event, Better):
+            found = [event.candidate]
+        elif isinstance(event, Done):
+            self.results[event.seed] = event.result
+            found = event.result.candidates
+        for candidate in found:
+            if self.best is None or candidate.energy["total"] < self.best.energy["total"]:
+                self.best = candidate
+        self.tell()
+
+    def tell(self) -> None:
+        """Tell the progress how far it is."""
+        done = len(self.results)
+        text = f"{done} seeds" if self._total is None else f"{done} of {self._total} seeds"
+        if self.best is not None:
+            text += f", best folding tree {len(self.best.tree.hinges)} hinges, "
+            text += f"energy {self.best.energy['total']:.2f}"
+        self._progress.update(self._share(done), text)
+
+    def check_failures(self) -> None:
+        """Raise where no seed did its work.
+
+        Raises
+        ------
+        WorkerError
+            If every seed failed: the first one's reason.
+        """
+        failed = [seed for seed, result in self.results.items() if result.failed]
+        if failed and len(failed) == len(self.results):
+            raise WorkerError(
+                f"every seed failed, {len(failed)} in all; the first: "
+                f"{self.results[min(failed)].why}. If memory is short, fewer --workers may do"
+            )
 
 
 def search(
@@ -68,9 +244,10 @@ def search(
     effort: Effort,
     *,
     workers: int | None = None,
+    scheduler: str | None = None,
     progress: Progress | None = None,
     known: Mapping[int, SeedResult] | None = None,
-    on_result: Callable[[int, SeedResult], None] | None = None,
+    hear: Callable[[Event], None] | None = None,
 ) -> list[Candidate]:
     """Trees that fold from all seeds, best first.
 
@@ -83,12 +260,14 @@ def search(
     effort : Effort
     workers : int, optional
         Processes; default one a core. One works in this process. Changes no result.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers run the seeds instead. Changes no result.
     progress : Progress, optional
         Hears of each finished seed and the best so far.
     known : mapping of int to SeedResult, optional
         Seeds that are done already.
-    on_result : callable, optional
-        Called with each seed and its result as it finishes, so that it can be kept.
+    hear : callable, optional
+        Told of each better tree, and of each seed that ends, so that they can be kept.
 
     Returns
     -------
@@ -99,90 +278,39 @@ def search(
     ------
     NoTreeError
         If no seed found any tree that fits the template.
+    WorkerError
+        If every seed failed, or the cluster is gone.
     """
-    progress = progress or SilentProgress()
-    results: dict[int, SeedResult] = dict(known or {})
-    todo = [seed for seed in seeds if seed not in results]
-    count = min(workers or os.cpu_count() or 1, max(1, len(todo)))
+    known = {seed: (known or {})[seed] for seed in seeds if seed in (known or {})}
+    tally = Tally(
+        progress or SilentProgress(), known, lambda done: done / max(1, len(seeds)), len(seeds)
+    )
+    todo = [seed for seed in seeds if seed not in known]
+    if todo:
 
-    def tell() -> None:
-        found = [c for result in results.values() for c in result.candidates]
-        best = min(found, key=lambda c: c.energy["total"], default=None)
-        text = f"{sum(s in results for s in seeds)} of {len(seeds)} seeds"
-        if best is not None:
-            text += f", best folding tree {len(best.tree.hinges)} hinges, "
-            text += f"energy {best.energy['total']:.2f}"
-        progress.update(sum(s in results for s in seeds) / max(1, len(seeds)), text)
+        def each(event: Event) -> None:
+            if hear is not None:
+                hear(event)
+            tally.hear(event)
 
-    tell()
-    run = _here if count == 1 else _in_processes
-    for seed, result in run(problem, todo, foldability, effort, count):
-        results[seed] = result
-        if on_result is not None:
-            on_result(seed, result)
-        tell()
+        job = Job(problem, foldability, effort)
+        forever = Budget()
+        with executor(workers, scheduler, len(todo), forever.over) as pool:
+            run_seeds(pool, [(seed, job) for seed in todo], each, forever.over)
+    tally.check_failures()
+    return best_first(seeds, tally.results)
+
+
+def best_first(seeds: Sequence[int], results: Mapping[int, SeedResult]) -> list[Candidate]:
+    """Candidates of all seeds by ascending energy, then seed.
+
+    Raises
+    ------
+    NoTreeError
+        If no seed found any tree that fits the template.
+    """
     ordered = [results[seed] for seed in seeds]
     if ordered and not any(result.fits for result in ordered):
         raise NoTreeError(ordered[0].why)
     merged = [candidate for result in ordered for candidate in result.candidates]
     return sorted(merged, key=lambda candidate: candidate.energy["total"])
-
-
-def _here(
-    problem: TreeProblem,
-    seeds: Sequence[int],
-    foldability: Foldability,
-    effort: Effort,
-    _workers: int,
-) -> Iterator[tuple[int, SeedResult]]:
-    for seed in seeds:
-        yield seed, _task(problem, seed, foldability, effort)
-
-
-def _in_processes(
-    problem: TreeProblem,
-    seeds: Sequence[int],
-    foldability: Foldability,
-    effort: Effort,
-    workers: int,
-) -> Iterator[tuple[int, SeedResult]]:
-    """Results as they come; a seed whose worker dies is tried again, alone, then left out."""
-    losses: dict[int, int] = {}
-    todo = list(seeds)
-    while todo:
-        # After a loss nobody knows which seed did it: one at a time finds out.
-        alone = [seed for seed in todo if losses.get(seed)]
-        batch = alone[:1] or todo
-        others = set(multiprocessing.active_children())
-        pool = ProcessPoolExecutor(
-            max_workers=1 if alone else workers,
-            mp_context=multiprocessing.get_context("spawn"),
-            initializer=_leave_signals_to_parent,
-        )
-        finished = False
-        try:
-            running: dict[Future[SeedResult], int] = {
-                pool.submit(_task, problem, seed, foldability, effort): seed for seed in batch
-            }
-            while running:
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in sorted(done, key=running.__getitem__):
-                    seed = running.pop(future)
-                    try:
-                        result = future.result()
-                    except BrokenProcessPool:
-                        losses[seed] = losses.get(seed, 0) + 1
-                        if losses[seed] < TRIES + 1:
-                            continue
-                        result = SeedResult(
-                            (), why=f"seed {seed} took its process down {TRIES} times"
-                        )
-                    todo.remove(seed)
-                    yield seed, result
-            finished = True
-        finally:
-            if not finished:
-                # Stopped half-way: the workers must not go on behind our back.
-                for process in set(multiprocessing.active_children()) - others:
-                    process.terminate()
-            pool.shutdown(wait=finished, cancel_futures=True)

@@ -13,7 +13,7 @@ from fabfold.files import write_json, write_npz
 from fabfold.fold.model import Motion
 from fabfold.joinery.model import BodyMesh, Joinery
 from fabfold.printing.checks import Check
-from fabfold.search import SeedResult
+from fabfold.seeds import SeedResult
 from fabfold.solid.model import Solid
 from fabfold.store import StageStore
 from fabfold.tree.model import FoldTree
@@ -80,6 +80,7 @@ def save_seed(store: StageStore, seed: int, result: SeedResult) -> list[str]:
         "version": 1,
         "fits": result.fits,
         "why": result.why,
+        "cut": result.cut,
         "candidates": entries,
     }
     write_json(store.path(file), content)
@@ -97,7 +98,7 @@ def load_seed(store: StageStore, seed: int) -> SeedResult:
         )
         for entry in data["candidates"]
     )
-    return SeedResult(candidates, data["fits"], data["why"])
+    return SeedResult(candidates, data["fits"], data["why"], data.get("cut"))
 
 
 def save_made(store: StageStore, made: Made) -> list[str]:

@@ -1,35 +1,25 @@
 """Many seeds over processes: the same answer, whoever runs it and whatever dies."""
 
-import os
-import signal
+import multiprocessing
+import subprocess
+import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from judges import Deadly, Deaf, Poisoned, Results, first_question
 from tree_cases import solid_problem, strip
 
-from fabfold.errors import NoTreeError
+from fabfold.errors import NoTreeError, RecipeError, WorkerError
 from fabfold.fold.foldability import LatticeFoldability
-from fabfold.search import SeedResult, search
+from fabfold.search import executor, run_seeds, search
+from fabfold.seeds import Job, SeedResult
+from fabfold.tree.check import check_tree
 from fabfold.tree.effort import EFFORTS
 
 EFFORT = replace(EFFORTS["quick"], restarts=2, polishing=20)
-
-
-class Deadly(LatticeFoldability):
-    """A judge that kills its process, `deaths` times in all (counted in a folder)."""
-
-    def __init__(self, folder, deaths):
-        super().__init__()
-        self.folder, self.deaths = str(folder), deaths
-
-    def path(self, system):
-        dead = Path(self.folder)
-        if len(list(dead.iterdir())) < self.deaths:
-            (dead / str(os.getpid())).touch()
-            os.kill(os.getpid(), signal.SIGKILL)
-        return super().path(system)
 
 
 @pytest.fixture(scope="module")
@@ -58,20 +48,20 @@ def test_the_number_of_workers_changes_nothing(problem, alone):
 
 
 def test_known_seeds_are_not_searched_again(problem, alone):
-    kept = {}
-    search(problem, [0, 1], LatticeFoldability(), EFFORT, workers=1, on_result=kept.__setitem__)
-    assert sorted(kept) == [0, 1]
-    fresh = {}
+    kept = Results()
+    search(problem, [0, 1], LatticeFoldability(), EFFORT, workers=1, hear=kept.hear)
+    assert sorted(kept.done) == [0, 1]
+    fresh = Results()
     again = search(
         problem,
         range(4),
         LatticeFoldability(),
         EFFORT,
         workers=1,
-        known=kept,
-        on_result=fresh.__setitem__,
+        known=kept.done,
+        hear=fresh.hear,
     )
-    assert sorted(fresh) == [2, 3]
+    assert sorted(fresh.done) == [2, 3]
     assert key(again) == key(alone)
 
 
@@ -82,12 +72,117 @@ def test_a_killed_worker_costs_nothing(problem, alone, tmp_path):
     assert key(found) == key(alone)
 
 
-def test_a_seed_that_always_kills_is_left_out(problem, tmp_path):
-    results = {}
-    judge = Deadly(tmp_path, deaths=10**6)
-    found = search(problem, [0, 1], judge, EFFORT, workers=2, on_result=results.__setitem__)
-    assert found == []
-    assert all("took its process down" in result.why for result in results.values())
+def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alone):
+    heard = Results()
+    judge = Poisoned(first_question(problem, 2, EFFORT))
+    found = search(problem, range(4), judge, EFFORT, workers=2, hear=heard.hear)
+    assert key(found) == key([c for c in alone if c.seed != 2])
+    assert heard.done[2].failed
+    assert heard.done[2].why == "seed 2 took its worker down 3 times"
+    assert not any(heard.done[seed].failed for seed in (0, 1, 3))
+
+
+def test_a_seed_that_raises_is_left_out_and_the_others_return(problem, alone):
+    for workers in (1, 2):
+        heard = Results()
+        judge = Poisoned(first_question(problem, 1, EFFORT), exits=False)
+        found = search(problem, range(3), judge, EFFORT, workers=workers, hear=heard.hear)
+        assert key(found) == key([c for c in alone if c.seed in (0, 2)])
+        assert heard.done[1].failed
+        assert "ZeroDivisionError" in heard.done[1].why
+
+
+def test_where_every_seed_fails_it_is_said_and_not_taken_for_no_fold(problem):
+    judge = Poisoned(first_question(problem, 7, EFFORT), exits=False)
+    with pytest.raises(WorkerError, match="every seed failed"):
+        search(problem, [7], judge, EFFORT, workers=1)
+
+
+def test_better_trees_are_told_of_before_the_seed_ends(problem):
+    for workers in (1, 2):
+        heard = Results()
+        search(problem, [0, 1], LatticeFoldability(), EFFORT, workers=workers, hear=heard.hear)
+        for seed, result in heard.done.items():
+            told = heard.better[seed]
+            assert told[-1].energy["total"] == result.best
+            assert [c.energy["total"] for c in told] == sorted(
+                (c.energy["total"] for c in told), reverse=True
+            )
+            assert heard.order.index(("Better", seed)) < heard.order.index(("Done", seed))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, workers):
+    heard = Results()
+    endless = replace(EFFORT, polishing=10**9)
+    job = Job(problem, LatticeFoldability(), endless)
+
+    def over():
+        return len(heard.better) == workers
+
+    with executor(workers, None, workers, over) as pool:
+        run_seeds(pool, ((seed, job) for seed in range(100)), heard.hear, over)
+    assert sorted(heard.done) == list(range(workers))
+    for result in heard.done.values():
+        assert result.cut == 0.0
+        assert result.candidates
+        assert check_tree(result.candidates[0].tree) == []
+
+
+def test_a_worker_that_does_not_hear_is_ended_and_its_last_word_counts(problem, monkeypatch):
+    monkeypatch.setattr("fabfold.search.GRACE", 0.2)
+    heard = Results()
+    job = Job(problem, Deaf(), EFFORT)
+
+    def over():
+        return bool(heard.better)
+
+    with executor(2, None, 1, over) as pool:
+        run_seeds(pool, [(0, job)], heard.hear, over)
+    assert heard.done[0].candidates == (heard.better[0][-1],)
+    assert heard.done[0].cut == 0.0
+    assert not multiprocessing.active_children()
+
+
+def test_workers_end_when_their_parent_is_killed():
+    code = (
+        "import multiprocessing\n"
+        "from test_search import *\n"
+        "def hear(event):\n"
+        "    print(*[p.pid for p in multiprocessing.active_children()], flush=True)\n"
+        "if __name__ == '__main__':\n"
+        "    problem = solid_problem(strip(8), 'box-2x2x2')\n"
+        "    job = Job(problem, LatticeFoldability(), replace(EFFORT, polishing=10**9))\n"
+        "    with executor(2, None, 2, lambda: False) as pool:\n"
+        "        run_seeds(pool, [(0, job), (1, job)], hear, lambda: False)\n"
+    )
+    run = subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=Path(__file__).parent,
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+    )
+    workers = [int(pid) for pid in run.stdout.readline().split()]
+    assert len(workers) == 2
+    assert all(lives(pid) for pid in workers)
+    run.kill()
+    run.communicate()
+    deadline = time.monotonic() + 120
+    while any(lives(pid) for pid in workers) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(lives(pid) for pid in workers)
+
+
+def lives(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_there_must_be_a_worker(problem):
+    with pytest.raises(RecipeError, match="--workers 0"):
+        search(problem, [0], LatticeFoldability(), EFFORT, workers=0)
 
 
 def test_progress_tells_the_best_so_far(problem):

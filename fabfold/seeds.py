@@ -1,0 +1,147 @@
+"""One seed of the tree search as a task: what it is given, what it tells, and who may run it."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from fabfold.errors import NoFoldError, NoTreeError
+from fabfold.tree.effort import Effort
+from fabfold.tree.foldability import Foldability
+from fabfold.tree.problem import TreeProblem
+from fabfold.tree.solve import Candidate, solve
+
+__all__ = ["Better", "Done", "Event", "Executor", "Job", "Lost", "SeedResult", "run_seed"]
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all seeds of a round share; pickles."""
+
+    problem: TreeProblem
+    foldability: Foldability
+    effort: Effort
+
+
+@dataclass(frozen=True)
+class SeedResult:
+    """What one seed found.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        Trees that fold, best first; empty where none was found.
+    fits : bool
+        Whether any tree fitted the template, folding or not.
+    why : str
+        What the search said where it found nothing.
+    cut : float or None
+        None where the seed ran to its end. Else the seconds of the budget that ended it early,
+        0 where it was interrupted.
+    failed : bool
+        Whether it raised an error or took its workers down; then `why` tells.
+    """
+
+    candidates: tuple[Candidate, ...]
+    fits: bool = True
+    why: str = ""
+    cut: float | None = None
+    failed: bool = False
+
+    @property
+    def best(self) -> float:
+        """Energy of the best tree; infinite where there is none."""
+        return min((c.energy["total"] for c in self.candidates), default=float("inf"))
+
+
+@dataclass(frozen=True)
+class Better:
+    """A seed that runs found a better tree that folds."""
+
+    seed: int
+    candidate: Candidate
+
+
+@dataclass(frozen=True)
+class Done:
+    """A seed ended."""
+
+    seed: int
+    result: SeedResult
+
+
+@dataclass(frozen=True)
+class Lost:
+    """The worker that ran a seed is gone."""
+
+    seed: int
+
+
+Event = Better | Done | Lost
+
+
+class Executor(Protocol):
+    """Runs seeds somewhere, one in a worker at a time, so that a dead worker tells which it was.
+
+    Whoever runs the search decides what is tried again; an executor only tells of the loss.
+    """
+
+    def free(self) -> int:
+        """Seeds that can be taken now."""
+
+    def submit(self, job: Job, seed: int) -> None:
+        """Start a seed; only where one is free."""
+
+    def wait(self, hear: Callable[[Event], None], seconds: float) -> None:
+        """Tell `hear` what happened, after waiting for it `seconds` at most.
+
+        Raises
+        ------
+        WorkerError
+            If no worker is left, and none comes.
+        """
+
+    def stop(self) -> None:
+        """Ask the seeds that run to end early with what they have."""
+
+    def close(self) -> None:
+        """Leave nothing running."""
+
+
+def run_seed(
+    job: Job, seed: int, report: Callable[[Candidate], None], stop: Callable[[], bool]
+) -> SeedResult:
+    """Search one seed, here and now.
+
+    Parameters
+    ----------
+    job : Job
+    seed : int
+    report : callable
+        Called with each better tree as it is found.
+    stop : callable
+        Polled; once it returns True the seed ends with what it has.
+    """
+    heard = False
+
+    def stopped() -> bool:
+        nonlocal heard
+        heard = heard or stop()
+        return heard
+
+    candidates: tuple[Candidate, ...] = ()
+    fits, why, failed = True, "", False
+    try:
+        candidates = tuple(
+            solve(job.problem, seed, job.foldability, job.effort, report=report, stop=stopped)
+        )
+    except NoFoldError as error:
+        why = str(error)
+    except NoTreeError as error:
+        fits, why = False, str(error)
+    except Exception:
+        # One seed that trips over a mistake must not take the others' results with it.
+        why, failed = f"seed {seed} failed:\n{traceback.format_exc()}", True
+    return SeedResult(candidates, fits, why, cut=0.0 if heard else None, failed=failed)

@@ -1,0 +1,100 @@
+"""Judges of folding that misbehave, and what hears of a search; workers import this by name."""
+
+import hashlib
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+
+from fabfold.fold.foldability import LatticeFoldability
+from fabfold.seeds import Done, Job, run_seed
+
+
+class Results:
+    """Hears of a search."""
+
+    def __init__(self):
+        self.done, self.better, self.order = {}, {}, []
+
+    def hear(self, event):
+        self.order.append((type(event).__name__, event.seed))
+        if isinstance(event, Done):
+            self.done[event.seed] = event.result
+        else:
+            self.better.setdefault(event.seed, []).append(event.candidate)
+
+
+def mark_of(system):
+    return hashlib.sha256(b"".join(np.asarray(part).tobytes() for part in system)).hexdigest()
+
+
+class Recording(LatticeFoldability):
+    """Notes what it is asked."""
+
+    def path(self, system):
+        self.__dict__.setdefault("asked", []).append(mark_of(system))
+        return super().path(system)
+
+
+def first_question(problem, seed, effort):
+    """What tells a seed's run from another: the first system whose path it wants."""
+    judge = Recording()
+    run_seed(Job(problem, judge, effort), seed, lambda _candidate: None, lambda: False)
+    return judge.asked[0]
+
+
+class Poisoned(LatticeFoldability):
+    """Ends the process, or raises, when it is asked for one system."""
+
+    def __init__(self, mark, exits=True):
+        super().__init__()
+        self.__dict__.update(mark=mark, exits=exits)
+
+    def path(self, system):
+        if mark_of(system) == self.mark:
+            if self.exits:
+                os._exit(3)
+            raise ZeroDivisionError("poisoned")
+        return super().path(system)
+
+
+class Deadly(LatticeFoldability):
+    """Kills its process, `deaths` times in all (counted in a folder)."""
+
+    def __init__(self, folder, deaths):
+        super().__init__()
+        self.__dict__.update(folder=str(folder), deaths=deaths)
+
+    def path(self, system):
+        dead = Path(self.folder)
+        if len(list(dead.iterdir())) < self.deaths:
+            (dead / str(os.getpid())).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().path(system)
+
+
+class Deaf(LatticeFoldability):
+    """Answers one question for a path, then never comes back."""
+
+    def path(self, system):
+        if "answered" in self.__dict__:
+            time.sleep(3600)
+        self.__dict__["answered"] = True
+        return super().path(system)
+
+
+class Announcing(LatticeFoldability):
+    """Leaves its process id in a folder and waits until a file `go` is there."""
+
+    def __init__(self, folder):
+        super().__init__()
+        self.__dict__.update(folder=str(folder))
+
+    def path(self, system):
+        folder = Path(self.folder)
+        (folder / str(os.getpid())).touch()
+        while not (folder / "go").exists():
+            time.sleep(0.05)
+        return super().path(system)
