@@ -102,3 +102,9 @@ def full_voxels(tree: FoldTree, holes: list[tuple[Cell, Cell]] | None = None) ->
 def full_material(tree: FoldTree) -> NDArray[np.bool_]:
     """Material of cells that are all full."""
     return np.ones((len(tree.source), 20, 20, 20), dtype=bool)
+
+
+#: The same, and a third body that folds into the slot when it is empty: its hinge sits on the
+#: edge of the far wall that the first cell passes.
+LID = [*SLOT, [(2, 1, 0)]]
+LID_HINGES = [*SLOT_HINGES, ((2, 0, 0), (2, 1, 0), (-1, 0, 0), 2)]

@@ -46,7 +46,7 @@ SKIN_COST, CORE_COST, HINGE_COST = 3.0, 2.0, 1e6
 #: Subvoxels that count as surface, counted from the outside.
 _SKIN_DEPTH = 2
 #: Radii at which a meeting may change sides.
-_SPLITS = 7
+_SPLITS = 11
 #: Meetings that may be worked out anew to improve a first choice.
 _IMPROVEMENTS = 60_000
 #: Prices of carving with which the planner is asked, see :func:`fabfold.fold.planner.plan`.

@@ -44,8 +44,8 @@ _SPARE_MM = 0.01
 #: How far tools reach beyond the quadrant in which both cells lie.
 _BEYOND = np.radians(25.0)
 _ARC_STEP = np.radians(3.0)
-#: Least volume that counts as cut, in mm³.
-_LEAST_MM3 = 0.01
+#: Least volume that counts as cut, and that a tool must meet to be used, in mm³.
+_LEAST_MM3, _TOUCH_MM3 = 0.01, 1e-6
 #: Share of the bracket and knuckles of a hinge that a tool may graze.
 _GRAZE = 0.005
 
@@ -267,10 +267,10 @@ class _Bench:
         tool = _worked_out(tool.transform(_inverse(frame)) ^ self._box(voxel, 2 * self._reach))
         cell = self._cell(voxel)
         body = int(self.body[voxel])
-        hit = (cell ^ tool).volume() > _LEAST_MM3
+        hit = (cell ^ tool).volume() > _TOUCH_MM3
         for half, _ in self.halves[body]:
             lost = (half ^ tool).volume()
-            hit = hit or lost > 1e-6
+            hit = hit or lost > _TOUCH_MM3
             if lost > _GRAZE * half.volume():
                 raise GeometryError(
                     f"{self.tree.bodies[body].name}: carving would take {lost:.1f} mm³ of one of "
