@@ -17,7 +17,15 @@ if TYPE_CHECKING:
     from fabfold.voxels.features import Features
     from fabfold.voxels.model import Voxels
 
-__all__ = ["Tables", "TreeProblem", "Weights", "from_features", "joint_table", "tree_problem"]
+__all__ = [
+    "Tables",
+    "TreeProblem",
+    "Weights",
+    "cost_table",
+    "from_features",
+    "joint_table",
+    "tree_problem",
+]
 
 
 @dataclass(frozen=True)
@@ -92,6 +100,8 @@ class TreeProblem:
     joints : tuple of J tuples of 6 Joint
         Joint types by index, one for each face of the parent; index 0 is the rigid joint.
     tables : Tables
+    roots : (k, 2) int32 array or None
+        Voxels and their poses that growing may start from; None for all.
     """
 
     template: Template
@@ -100,6 +110,7 @@ class TreeProblem:
     weights: Weights
     joints: tuple[tuple[Joint, ...], ...]
     tables: Tables
+    roots: NDArray[np.int32] | None = None
 
     def __len__(self) -> int:
         return len(self.source)
@@ -166,12 +177,13 @@ def joint_table(
     return step, np.ascontiguousarray(around), exposed
 
 
-def _cost_table(
+def cost_table(
     depth: NDArray[np.float64],
     exposed: NDArray[np.uint8],
     weight: float,
     bias: NDArray[np.floating] | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """``Tables.cost`` and ``Tables.centre`` of voxels with ray depths (n, 6)."""
     # Face f of the cell in B is face turned[r, f] of the voxel in A.
     turned = np.array(
         [[int(np.flatnonzero((d @ r == FACES).all(axis=1))[0]) for d in FACES] for r in ROTATIONS]
@@ -258,7 +270,7 @@ def tree_problem(
             if allowed[parent, side].any():
                 neighbour[parent, side] = child
     _require_connected(neighbour)
-    cost, centre = _cost_table(depth, exposed, weights.surface, bias)
+    cost, centre = cost_table(depth, exposed, weights.surface, bias)
     whole = np.zeros((count, 6), dtype=bool)
     if stiff is not None and np.any(stiff):
         for i, j in np.asarray(pairs)[np.asarray(stiff, dtype=bool)].tolist():

@@ -140,6 +140,10 @@ def grow(
         wanted = cells[(colour[root] + colourings[int(rng.integers(len(colourings)))]) % 2]
         start = np.full(count, -1, np.int32)
         start[root] = 24 * wanted[rng.integers(len(wanted))] + rng.integers(24)
+        if problem.roots is not None:
+            start[root] = -1
+            root, first = problem.roots[rng.integers(len(problem.roots))].tolist()
+            start[root] = first
         todo = np.flatnonzero(start < 0).astype(np.int32)
         if len(todo):
             fill_beam(problem.tables, start, todo, beam, 0.3, 0.5, True, state, out)
