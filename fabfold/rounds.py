@@ -8,6 +8,7 @@ from itertools import groupby
 from typing import Any
 
 from fabfold.errors import NoFoldError, NoTreeError
+from fabfold.fold.closing import closed
 from fabfold.fold.foldability import LatticeFoldability
 from fabfold.lattice import Template
 from fabfold.progress import Progress
@@ -17,6 +18,7 @@ from fabfold.seeds import Event, Job, SeedResult
 from fabfold.shelf import Shelf
 from fabfold.store import StageStore, stage_key
 from fabfold.tree.effort import EFFORTS
+from fabfold.tree.parts import parted
 from fabfold.tree.problem import Weights, from_features
 from fabfold.tree.solve import Candidate
 from fabfold.voxels.features import features
@@ -157,7 +159,7 @@ class Rounds:
             pairs = [
                 (self._voxels((seed - first) // count), candidate)
                 for seed in sorted(results)
-                for candidate in results[seed].candidates
+                for candidate in self._closed(results[seed].candidates)
             ]
             self._ranked = sorted(pairs, key=lambda pair: pair[1].energy["total"])
             if results and not any(result.fits for result in results.values()):
@@ -225,7 +227,10 @@ class Rounds:
     def _job(self, number: int) -> Job:
         voxels = self._voxels(number)
         weights = Weights(surface=self.recipe.surface_weight, single=self.recipe.single_weight)
-        problem = from_features(voxels, features(voxels), self.template, weights)
+        joints = features(voxels)
+        problem = from_features(voxels, joints, self.template, weights)
+        if self.template.creases:
+            problem = parted(problem, self._seeds(number)[0], joints.depth)
         return Job(problem, LatticeFoldability(), EFFORTS[self.recipe.effort])
 
     def _round(self, number: int) -> list[Candidate]:
@@ -255,5 +260,11 @@ class Rounds:
                     known=known,
                     hear=hear,
                 )
+        candidates = self._closed(candidates)
         self._done[number] = candidates
         return candidates
+
+    def _closed(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Those that can be folded along the template's creases too, where it has any."""
+        folded = (closed(candidate, self.template) for candidate in candidates)
+        return [candidate for candidate in folded if candidate is not None]
