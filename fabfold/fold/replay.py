@@ -88,14 +88,16 @@ def material_boxes(
     Returns
     -------
     list of (body, low, high)
-        Corners in lattice units of shape A; cells without material are left out.
+        Corners in lattice units of shape A; cells without material are left out. A link plate is a
+        sheet of a third of the gap in the middle of its face: its pockets do not show in boxes.
     """
     import manifold3d
 
     half = 0.5 - 0.5 * gap_mm / voxel_mm
     found = []
     for index, (body, (vertices, faces)) in enumerate(zip(tree.bodies, meshes, strict=True)):
-        if not body.voxels:
+        if body.edge is not None:
+            found.append((index, *_sheet(tree, index, vertices, voxel_mm, origin_mm, gap_mm)))
             continue
         lattice = (np.asarray(vertices, dtype=float) - np.asarray(origin_mm, float)) / voxel_mm
         solid = manifold3d.Manifold(
@@ -118,6 +120,28 @@ def material_boxes(
             if (box[3:] - box[:3]).min() > 1e-6:
                 found.append((index, box[:3], box[3:]))
     return found
+
+
+def _sheet(
+    tree: FoldTree,
+    link: int,
+    vertices: F64,
+    voxel_mm: float,
+    origin_mm: Sequence[float],
+    gap_mm: float,
+) -> tuple[F64, F64]:
+    """Corners of the sheet that stands for a link plate, lattice units of shape A."""
+    number = tree.bodies[link].edge
+    edge = tree.edges[-1 if number is None else number]
+    parent, child = tree.source[edge.parent].astype(float), tree.source[edge.child].astype(float)
+    lattice = (np.asarray(vertices, dtype=float) - np.asarray(origin_mm, float)) / voxel_mm
+    flat = child == parent
+    # Knuckles stand out of the face beyond the axes.
+    room = 0.5 - 0.5 * gap_mm / voxel_mm
+    middle, thick = (parent + child) / 2, gap_mm / voxel_mm / 6
+    low = np.where(flat, np.maximum(lattice.min(axis=0), middle - room), middle - thick)
+    high = np.where(flat, np.minimum(lattice.max(axis=0), middle + room), middle + thick)
+    return low, high
 
 
 def _model(tree: FoldTree, boxes: list[tuple[int, F64, F64]]) -> mujoco.MjModel:
@@ -159,7 +183,7 @@ def _model(tree: FoldTree, boxes: list[tuple[int, F64, F64]]) -> mujoco.MjModel:
     for index, body in enumerate(bodies):
         if index in filled:
             continue
-        # Link plates weigh something but meet nothing: they lie in the gaps between boxes.
+        # Every body weighs something, also one whose material all lies outside its cells.
         centre = tree.hinges[index - 1].point if index else (0.0, 0.0, 0.0)
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -186,7 +210,7 @@ def replay(
     """Fold the bodies in MuJoCo along the path.
 
     Each body is a set of boxes, one about its material in each cell (hinge barrels that stand out
-    of the cell are not simulated). The root body is held; a position motor on every hinge follows
+    of the cell are not simulated); a link plate is a sheet between them. The root body is held; a position motor on every hinge follows
     the path, speeding up and slowing down smoothly in every move.
 
     Parameters
@@ -252,6 +276,8 @@ def replay(
             )
     angles = np.degrees(data.qpos[joint])
     told.update(1.0, f"deepest contact {deepest * voxel_mm:.3f} mm")
+    links = sum(body.edge is not None for body in tree.bodies)
+    sheets = f", {links} link plates as sheets between them" if links else ""
     return ReplayReport(
         max_penetration_mm=round(deepest * voxel_mm, 4),
         max_angle_error_deg=round(float(np.degrees(worst)), 4),
@@ -260,8 +286,9 @@ def replay(
         contact_steps=touching,
         steps=steps,
         geometry=(
-            f"{len(boxes)} boxes about the material of {len(tree.bodies)} bodies in each cell, "
-            f"{gap_mm:g} mm apart, hinge barrels left out; root held, no gravity, "
+            f"{len(boxes) - links} boxes about the material of {len(tree.bodies) - links} bodies "
+            f"in each cell, {gap_mm:g} mm apart{sheets}, hinge barrels left out; root held, no "
+            "gravity, "
             f"{seconds_per_quarter:g} s for 90°"
         ),
     )

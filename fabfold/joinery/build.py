@@ -223,9 +223,9 @@ def _body(
     halves = [
         less(item.half, [other.carve for other in own if other.hinge != item.hinge]) for item in own
     ]
-    boxes = cut.boxes(cells, halves)
-    grooves = cut.grooves(*boxes)
-    pockets = cut.pockets(*boxes)
+    grooves = cut.grooves(*cut.boxes(cells, halves))
+    # Plates keep off knuckles, and all else is inside the cells.
+    pockets = cut.pockets(*cut.boxes(cells, []))
     in_material = meeting([*grooves, *pockets], material)
     if in_material:
         lost, material = material.split(united(in_material))

@@ -27,6 +27,8 @@ __all__ = ["Cut", "bounds", "evaluated", "less", "meeting", "united"]
 _ZONE_LOSS_MM3 = 0.01
 #: The knuckles that pockets keep off are a little larger than they are, in mm.
 _SHIELD_MM = 0.01
+#: Tools are cut down to what they take and this much on every side, in mm.
+_ROUND_MM = 0.5
 
 Floats = NDArray[np.float64]
 
@@ -104,22 +106,28 @@ class Cut:
     def pockets(self, low: Floats, high: Floats) -> Tools:
         """Tools for the link plates that pass, with the link of each.
 
-        In the two cells beside a plate the hinge makes room for it, all around its turn.
+        In the two cells beside a plate the hinge itself makes room for it, all around its turn.
+
+        Parameters
+        ----------
+        low, high : (m, 3) float64 arrays
+            Boxes that hold the body, lattice units: its cells, or what there is of a link.
         """
         import manifold3d
 
         tools = []
         side = self.voxel_mm
-        for link, tool in plate_tools(self.plate_ways, low, high, voxel_mm=side):
-            plate = self.fitted.plates[link]
+        cube = manifold3d.Manifold.cube((side, side, side), True)
+        for link, plate in self.fitted.plates.items():
+            ways = [way for way in self.plate_ways if way.hinge == link]
             if self.index not in plate.bodies:
-                tools.append((link, tool))
+                tools += plate_tools(ways, low, high, voxel_mm=side)
                 continue
-            cell = plate.cells[plate.bodies.index(self.index)]
-            cube = manifold3d.Manifold.cube((side, side, side), True)
-            rest = evaluated(tool - cube.translate(tuple(side * cell.astype(float))))
-            if not rest.is_empty():
-                tools.append((link, rest))
+            cell = plate.cells[plate.bodies.index(self.index)].astype(float)
+            rest = (np.abs((low + high) / 2 - cell) > 1e-6).any(axis=1)
+            mine = cube.translate(tuple(side * cell))
+            for _, tool in plate_tools(ways, low[rest], high[rest], voxel_mm=side):
+                tools.append((link, evaluated(tool - mine)))
         return tools
 
     def half(
@@ -181,13 +189,25 @@ def less(solid: manifold3d.Manifold, tools: list[manifold3d.Manifold]) -> manifo
 
 
 def meeting(tools: Tools, solid: manifold3d.Manifold) -> list[manifold3d.Manifold]:
-    """The tools that take something off a solid: most pass by where a cell is empty."""
+    """The tools that take something off a solid, each cut down to a box about what it takes.
+
+    Most pass by where a cell is empty, and those that do not mostly graze. Hundreds of hulls in a
+    row unite much faster when only the parts that matter are left of them.
+    """
+    import manifold3d
+
     low, high = bounds(solid)
     found = []
     for _, tool in tools:
         start, end = bounds(tool)
-        if (start < high).all() and (low < end).all() and (solid ^ tool).volume() > 1e-6:
-            found.append(tool)
+        if not ((start < high).all() and (low < end).all()):
+            continue
+        common = solid ^ tool
+        if common.volume() <= 1e-6:
+            continue
+        start, end = bounds(common)
+        box = manifold3d.Manifold.cube(tuple(end - start + 2 * _ROUND_MM))
+        found.append(evaluated(tool ^ box.translate(tuple(start - _ROUND_MM))))
     return found
 
 

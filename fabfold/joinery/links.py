@@ -43,7 +43,7 @@ def link_body(cut: Cut, tally: Tally) -> manifold3d.Manifold:
         return solid
     whole = cut.half(solid, grooves, pockets)
     # Half a wall more on both sides: what then still hangs together has necks of a wall.
-    narrow = less(whole, [tool for _, tool in cut.grooves(low, high, MIN_WALL_MM / 2)])
+    narrow = less(whole, meeting(cut.grooves(low, high, MIN_WALL_MM / 2), whole))
     if not _joined(cut, plate, narrow):
         raise GeometryError(
             f"{cut.name}: {', '.join(dict.fromkeys(culprits))} cut it apart on the folding path, "
