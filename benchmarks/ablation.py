@@ -1,0 +1,360 @@
+"""What each part of the search brings: writes benchmarks/ablation.md and .json.
+
+    python benchmarks/ablation.py [--models bunny kitten] [--seeds 1 2 3 4 5] [--seconds 20]
+        [--parts closure octants ...] [--work DIR] [--only-table]
+
+Each variant leaves one part of the product's search out (or puts one in), and runs the same seeds
+on the same voxels for the same seconds of one core. Growth is looked at by itself: how many of the
+same root poses end with every voxel in its place.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+import runs
+from runs import HERE, MODELS
+
+#: Variants of the whole search: name and what is different.
+VARIANTS = {
+    "full": "the product's search",
+    "no improvement": "grown trees are only tested: no phase A, no phase B",
+    "no polish": "phase A alone: the first tree that folds is the result",
+    "no closure": "the objective asks the planner alone, not the closure test",
+    "no planner": "the objective asks the closure test alone; the planner filters afterwards",
+    "fold afterwards": "the energy alone is lowered; closure and planner filter afterwards",
+    "one tree": "one spanning tree for each set of poses instead of several",
+    "octants": "put in: eighths of cells count as they hold material (partial fill)",
+}
+#: Variants of growth alone.
+GROWTH = {
+    "constrained first + insertion": "as in the product",
+    "constrained first": "voxels that find no place are not put in by moving others",
+    "breadth first + insertion": "a fixed breadth-first order of the voxels",
+    "breadth first": "the same, without insertion",
+}
+
+
+@dataclass(frozen=True)
+class Unclosed:
+    """A judge that never asks the closure test."""
+
+    judge: Any
+
+    def stuck(self, system: Any) -> tuple[int, int]:
+        return (0, 0)
+
+    def stuck_hinges(self, system: Any) -> Any:
+        return np.zeros((2, len(system.parent)), dtype=bool)
+
+    def remaining(self, system: Any, expansions: int) -> Any:
+        return self.judge.remaining(system, expansions)
+
+    def unresolved(self, system: Any, expansions: int) -> float:
+        return float(self.judge.unresolved(system, expansions))
+
+    def path(self, system: Any) -> Any:
+        return self.judge.path(system)
+
+
+@dataclass(frozen=True)
+class Unplanned(Unclosed):
+    """A judge that takes for folding whatever passes the closure test."""
+
+    def stuck(self, system: Any) -> tuple[int, int]:
+        one, two = self.judge.stuck(system)
+        return int(one), int(two)
+
+    def stuck_hinges(self, system: Any) -> Any:
+        return self.judge.stuck_hinges(system)
+
+    def remaining(self, system: Any, expansions: int) -> Any:
+        return np.zeros(len(system.parent), dtype=np.int32)
+
+    def unresolved(self, system: Any, expansions: int) -> float:
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Unjudged(Unplanned):
+    """A judge that takes everything for folding, until a path is asked for."""
+
+    def stuck(self, system: Any) -> tuple[int, int]:
+        return (0, 0)
+
+    def stuck_hinges(self, system: Any) -> Any:
+        return np.zeros((2, len(system.parent)), dtype=bool)
+
+
+def changed(variant: str, voxels: Any) -> Any:
+    """The change of a job that makes a variant."""
+    from fabfold.fold.foldability import octants_of
+
+    def change(job: Any) -> Any:
+        effort, judge = job.effort, job.foldability
+        if variant == "no improvement":
+            effort = replace(effort, closing=0, looking=0, polishing=0, restarts=10**6)
+        elif variant == "no polish":
+            effort = replace(effort, polishing=0)
+        elif variant == "one tree":
+            effort = replace(effort, trees=1)
+        elif variant == "no closure":
+            judge = Unclosed(judge)
+        elif variant == "no planner":
+            judge = Unplanned(judge)
+        elif variant == "fold afterwards":
+            judge = Unjudged(judge)
+        elif variant == "octants":
+            judge = replace(judge, octants=octants_of(voxels.subvoxels))
+        elif variant != "full":
+            raise SystemExit(f"no such variant: {variant}")
+        return replace(job, effort=effort, foldability=judge)
+
+    return change
+
+
+def run_variant(
+    model: runs.Model, folder: Path, variant: str, seed: int, joints: str, seconds: float
+) -> dict[str, Any]:
+    """One run of one variant: the seeds of the first round over and over, on the same voxels."""
+    from fabfold.seeds import run_seed
+
+    kit = runs.voxelized(model, folder)
+    rounds = runs.rounds_of(kit, runs.recipe_of(kit, seed, joints))
+    plain = rounds._job(0)
+    kernels = runs.warm_up(plain)
+    job = changed(variant, rounds.options[0])(plain)
+    runs.warm_up(job)
+    clock = runs.Recorder(seconds)
+    number, folded = 0, []
+    while not clock.over():
+        before = len(clock.events)
+        started = clock.cpu
+        best = clock.best
+        clock.best = float("inf")
+        found = run_seed(job, seed * 10_000 + number, clock.report, clock.over)
+        if found.failed:
+            raise SystemExit(found.why)
+        cut = found.cut is not None
+        folded.append([round(clock.cpu - started, 2), len(clock.events) > before, cut])
+        clock.best = min(best, clock.best)
+        number += 1
+    return {"kernels": kernels, "cpu": clock.cpu, "starts": folded, "events": clock.events}
+
+
+# --- growth -----------------------------------------------------------------------------------
+
+
+def breadth_first(neighbour: Any, root: int) -> list[int]:
+    """Voxels in the order in which a breadth-first walk from the root meets them."""
+    order, seen = [root], {root}
+    for u in order:
+        for v in neighbour[u].tolist():
+            if v >= 0 and v not in seen:
+                seen.add(v)
+                order.append(v)
+    return order
+
+
+def grown_in_order(problem: Any, start: Any, order: list[int], beam: int, state: Any) -> Any:
+    """Beam growth in a fixed order, one voxel at a time; the fullest state where all die."""
+    from fabfold.tree.grow import energy_of, fill_beam
+
+    states = [start]
+    out = np.empty((beam, len(start)), np.int32)
+    for v in order[1:]:
+        todo = np.array([v], dtype=np.int32)
+        found: dict[bytes, tuple[float, Any]] = {}
+        for pose in states:
+            rows, _ = fill_beam(problem.tables, pose, todo, beam, 0.3, 0.5, False, state, out)
+            for row in out[:rows]:
+                energy, _ = energy_of(problem.tables, row, 0.0)
+                found[row.tobytes()] = (energy, row.copy())
+        if not found:
+            # This voxel has no place in any state: go on without it.
+            continue
+        states = [pose for _, pose in sorted(found.values(), key=lambda e: e[0])[:beam]]
+    return states[0]
+
+
+def run_growth(model: runs.Model, folder: Path, variant: str, seed: int, joints: str) -> Any:
+    """Grow from the same root poses, one way or the other."""
+    from fabfold.lattice import parity
+    from fabfold.tree.grow import fill_beam
+    from fabfold.tree.rng import generator
+    from fabfold.tree.ruin import repair
+
+    kit = runs.voxelized(model, folder)
+    rounds = runs.rounds_of(kit, runs.recipe_of(kit, seed, joints))
+    job = rounds._job(0)
+    runs.warm_up(job)
+    problem, effort = job.problem, job.effort
+    tables = problem.tables
+    rng = np.random.default_rng([seed, 7])
+    state = generator(int(rng.integers(2**62)))
+    colour, colourings = parity(problem.source), problem.colourings()
+    cells = [np.flatnonzero(parity(problem.template.cells) == c) for c in (0, 1)]
+    count = len(problem)
+    out = np.empty((effort.beam, count), np.int32)
+    left_over, full = [], 0
+    spent = 0.0
+    roots = 20
+    for k in range(roots + 1):
+        root = int(rng.integers(count))
+        wanted = cells[(colour[root] + colourings[0]) % 2]
+        pose = np.full(count, -1, np.int32)
+        pose[root] = 24 * wanted[rng.integers(len(wanted))] + rng.integers(24)
+        began = time.process_time()
+        if variant.startswith("breadth"):
+            order = breadth_first(tables.neighbour, root)
+            pose = grown_in_order(problem, pose, order, effort.beam, state)
+        else:
+            todo = np.flatnonzero(pose < 0).astype(np.int32)
+            fill_beam(tables, pose, todo, effort.beam, 0.3, 0.5, True, state, out)
+            pose = out[0].copy()
+        before = int((pose < 0).sum())
+        done = before == 0
+        if variant.endswith("insertion"):
+            left, _ = repair(tables, pose, 2000, 20, 12, state)
+            done = left == 0
+        if k == 0:
+            continue  # The first one loads kernels.
+        spent += time.process_time() - began
+        left_over.append(before)
+        full += done
+    return {"roots": roots, "full": full, "left": left_over, "cpu": spent}
+
+
+# --- table ------------------------------------------------------------------------------------
+
+
+def path_of(work: Path, model: str, variant: str, seed: int) -> Path:
+    return work / "ablation" / f"{model}-{variant.replace(' ', '-')}-{seed}.json"
+
+
+def whole_row(variant: str, entries: list[dict[str, Any]], seconds: float) -> str:
+    firsts = [e["events"][0]["cpu"] if e["events"] else float("inf") for e in entries]
+    last = [min(e["events"], key=lambda v: v["total"]) for e in entries if e["events"]]
+    starts = [s for e in entries for s in e["starts"] if not s[2] or s[1]]
+    folded = sum(s[1] for s in starts)
+    middle = median(firsts)
+    cells = [
+        variant,
+        f"{len(last)} of {len(entries)}",
+        f"> {seconds:g}" if middle == float("inf") else f"{middle:.1f}",
+        f"{folded} of {len(starts)}",
+        f"{median(sum(v['joints'].values()) for v in last):.0f}" if last else "–",
+        f"{median(v['surface'] for v in last):.2f}" if last else "–",
+        f"{median(v['total'] for v in last):.2f}" if last else "–",
+    ]
+    return "| " + " | ".join(cells) + f" | {VARIANTS[variant]} |"
+
+
+def growth_row(variant: str, entries: list[dict[str, Any]]) -> str:
+    roots = sum(e["roots"] for e in entries)
+    left = [value for e in entries for value in e["left"]]
+    per_root = sum(e["cpu"] for e in entries) / roots
+    return (
+        f"| {variant} | {sum(e['full'] for e in entries)} of {roots} | {median(left):.0f} |"
+        f" {1000 * per_root:.0f} | {GROWTH[variant]} |"
+    )
+
+
+def table(data: dict[str, Any], facts: dict[str, Any]) -> str:
+    """Markdown of all that is there."""
+    lines = [
+        "# What each part of the search brings",
+        "",
+        "Written by `python benchmarks/ablation.py`. Every variant leaves one part of the search",
+        "out, or puts one in, and runs the same seeds on the same voxels for",
+        f"{facts['seconds']:g} seconds of one core each, joints {facts['joints']}. *Folds*: seeds",
+        "with a tree that folds as cubes on the lattice. *Runs*: how many of the search's own",
+        "seeds that came to an end, or found a tree, found one.",
+        "Joints and energies: median of the seeds that fold.",
+        "",
+        f"Machine: {runs.machine_line(facts)}.",
+    ]
+    for model, by_variant in data.items():
+        whole = [v for v in VARIANTS if v in by_variant]
+        if whole:
+            lines += [
+                "",
+                f"## {model}",
+                "",
+                "| variant | folds | first s, median | runs | joints | surface | energy | what |",
+                "|---|--:|--:|--:|--:|--:|--:|---|",
+            ]
+            lines += [whole_row(v, by_variant[v], facts["seconds"]) for v in whole]
+        growth = [v for v in GROWTH if v in by_variant]
+        if growth:
+            lines += [
+                "",
+                f"### Growth alone: {model}",
+                "",
+                "| order | every voxel placed | left before insertion | ms a root | what |",
+                "|---|--:|--:|--:|---|",
+            ]
+            lines += [growth_row(v, by_variant[v]) for v in growth]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--models", nargs="+", default=["bunny", "kitten"])
+    parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3, 4, 5])
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--joints", default="S", choices=["S", "S+D"])
+    parser.add_argument("--parts", nargs="+", default=[*VARIANTS, *GROWTH])
+    parser.add_argument("--work", type=Path, default=Path("search-runs"))
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--only-table", action="store_true")
+    parser.add_argument("--out", type=Path, default=HERE / "ablation.md")
+    parser.add_argument("--one", nargs=3, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        name, variant, seed = options.one[0], options.one[1], int(options.one[2])
+        where = (MODELS[name], options.work / name, variant, seed, options.joints)
+        found = run_growth(*where) if variant in GROWTH else run_variant(*where, options.seconds)
+        found |= {"seconds": options.seconds, "joints": options.joints}
+        runs.write(path_of(options.work, name, variant, seed), found)
+        return
+    if not options.only_table:
+        jobs = [
+            (name, variant, str(seed))
+            for seed in options.seeds
+            for name in options.models
+            for variant in options.parts
+            if not path_of(options.work, name, variant, seed).is_file()
+        ]
+        base = [sys.executable, __file__, "--work", str(options.work), "--joints", options.joints]
+        base += ["--seconds", str(options.seconds)]
+        for name in options.models:
+            runs.voxelized(MODELS[name], options.work / name)
+        runs.side_by_side(
+            [[*base, "--one", *job] for job in jobs], options.workers, [" ".join(j) for j in jobs]
+        )
+    data: dict[str, Any] = {}
+    for name in MODELS:
+        for variant in [*VARIANTS, *GROWTH]:
+            entries = [runs.read(path_of(options.work, name, variant, s)) for s in options.seeds]
+            if any(entries):
+                data.setdefault(name, {})[variant] = [e for e in entries if e]
+    facts = {**runs.machine(), "seconds": options.seconds, "joints": options.joints}
+    options.out.write_text(table(data, facts), encoding="utf-8")
+    options.out.with_suffix(".json").write_text(
+        json.dumps({"machine": facts, "runs": data}, indent=1) + "\n", encoding="utf-8"
+    )
+
+
+if __name__ == "__main__":
+    main()

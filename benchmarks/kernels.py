@@ -1,0 +1,240 @@
+"""Compiled kernels against the same code run by NumPy: writes benchmarks/kernels.md and .json.
+
+    python benchmarks/kernels.py [--seeds 1 2 3]
+
+The same tasks with the same seeds run twice, once compiled and once with NUMBA_DISABLE_JIT=1, where
+the kernels are plain Python on NumPy arrays. Answers are compared byte for byte. Then the time to
+the first answer is taken with an empty cache of compiled kernels, and again with the full one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import runs
+from runs import HERE
+
+
+def strip_problem(length: int, template: str) -> Any:
+    """A strip of cells, every joint printable, with a surface that prefers some poses."""
+    from fabfold.lattice import load_template
+    from fabfold.tree.problem import tree_problem
+
+    cells = np.array([(i, 0, 0) for i in range(length)], dtype=np.int32)
+    pairs = np.array([(i, i + 1) for i in range(length - 1)], dtype=np.int32)
+    return tree_problem(
+        cells,
+        load_template(template),
+        pairs=pairs,
+        rigid=np.ones(len(pairs), dtype=bool),
+        hinge=np.ones((len(pairs), 4), dtype=bool),
+        depth=np.random.default_rng(0).random((length, 6)),
+    )
+
+
+def digest(*values: Any) -> str:
+    """Digest of arrays, numbers and JSON."""
+    out = hashlib.sha256()
+    for value in values:
+        if isinstance(value, np.ndarray):
+            out.update(str((value.dtype, value.shape)).encode())
+            out.update(np.ascontiguousarray(value).tobytes())
+        else:
+            out.update(json.dumps(value, sort_keys=True).encode())
+    return out.hexdigest()[:16]
+
+
+def do_grow(seed: int) -> str:
+    from fabfold.tree.solve import grow
+
+    found = grow(strip_problem(18, "box-3x3x2"), seed, beam=6, roots=4, repairs=20)
+    return digest(*found)
+
+
+def do_solve(seed: int) -> str:
+    from fabfold.fold.foldability import LatticeFoldability
+    from fabfold.tree.effort import Effort
+    from fabfold.tree.solve import solve
+
+    effort = Effort(polishing=10, roots=20, look=200)
+    problem = strip_problem(8, "box-2x2x2")
+    found = solve(problem, seed, LatticeFoldability(expansions=400, patience=40), effort)
+    return digest(*[x for c in found for x in (c.tree.to_json(1.0, (0.0, 0.0, 0.0)), c.path)])
+
+
+def _system() -> Any:
+    """Strip of 12 cells with five hinges that roll it up."""
+    from fabfold.tree.system import HingeSystem
+
+    cells = np.array([(i, 0, 0) for i in range(12)], dtype=np.int32)
+    way = np.array([1, -1, 1, -1, 1])
+    return HingeSystem(
+        cells=cells,
+        body=(np.arange(12) // 2).astype(np.int32),
+        parent=np.arange(5, dtype=np.int32),
+        point2=np.array([(4 * h + 3, way[h], 0) for h in range(5)], dtype=np.int32),
+        axis=np.full(5, 2, dtype=np.int8),
+        turns=(2 * way).astype(np.int8),
+    )
+
+
+def do_closure(_seed: int) -> str:
+    from fabfold.fold.lattice import stuck_hinges
+
+    return digest(stuck_hinges(_system()))
+
+
+def do_plan(_seed: int) -> str:
+    from fabfold.fold.lattice import find_path
+
+    found = find_path(_system(), 300, 60)
+    path = np.zeros(0) if found.path is None else found.path
+    return digest(found.levels, found.expansions, path, found.apart)
+
+
+def do_certify(_seed: int) -> str:
+    """The swept proof of two boxes on a hinge."""
+    from fabfold.fold.bvh import empty_boxes, refit
+    from fabfold.fold.gap import least_gap
+
+    corners = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    faces = np.array(
+        [
+            [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]],
+            [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]],
+        ]
+    ).reshape(12, 3)
+    one = (corners * 9.7 - [10.0, 10.0, 5.0])[faces]
+    two = (corners * 9.7 + [0.15, -10.0, -5.0])[faces]
+    boxes, _ = empty_boxes([one, two])
+    refit(boxes, boxes.triangle.copy(), 0, int(boxes.root[-1]))
+    result = np.array([1.0, np.inf, 0.0])
+    verdict = least_gap(boxes, 1, 0, 0.0, np.pi / 2, 0.05, 0.01, result)
+    return digest(int(verdict), result)
+
+
+TASKS: dict[str, tuple[Callable[[int], str], str]] = {
+    "growth": (do_grow, "`grow`, 18 voxels into 3×3×2, 4 roots"),
+    "search": (do_solve, "`solve`, 8 voxels into 2×2×2, 10 steps of improvement"),
+    "closure": (do_closure, "`stuck_hinges`, 5 hinges, both ends"),
+    "planner": (do_plan, "`find_path`, 5 hinges, 300 expansions at most"),
+    "proof": (do_certify, "`least_gap`, two boxes through 90°"),
+}
+
+
+def tasks(seeds: list[int]) -> dict[str, Any]:
+    """Answers and processor seconds of all tasks, in this process."""
+    compiled = os.environ.get("NUMBA_DISABLE_JIT", "0") != "1"
+    out: dict[str, Any] = {}
+    for name, (task, _) in TASKS.items():
+        began = time.process_time()
+        task(0)
+        first = time.process_time() - began
+        answers, spent = [], 0.0
+        for seed in seeds:
+            rounds = 0
+            began = time.process_time()
+            while rounds == 0 or (compiled and time.process_time() - began < 0.2):
+                answer = task(seed)
+                rounds += 1
+            spent += (time.process_time() - began) / rounds
+            answers.append(answer)
+        out[name] = {"answers": answers, "first": first, "seconds": spent / len(seeds)}
+    return out
+
+
+def apart(seeds: list[int], **environment: str) -> dict[str, Any]:
+    """The same in a process of its own, with the clock's seconds for the whole process."""
+    command = [sys.executable, __file__, "--here", "--seeds", *map(str, seeds)]
+    began = time.perf_counter()
+    done = subprocess.run(
+        command,
+        env={**os.environ, **environment},
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return {"tasks": found, "wall": time.perf_counter() - began}
+
+
+def told(seconds: float) -> str:
+    """Seconds in a unit that suits them."""
+    for factor, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
+        if seconds * factor >= 1.0:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds * 1e9:.0f} ns"
+
+
+def table(data: dict[str, Any]) -> str:
+    """Markdown."""
+    one, two, cold, warm = (data[k]["tasks"] for k in ("numba", "numpy", "cold", "warm"))
+    seeds = ", ".join(map(str, data["seeds"]))
+    lines = [
+        "# Compiled kernels against NumPy",
+        "",
+        f"Written by `python benchmarks/kernels.py`. Every task with seeds {seeds}, once compiled",
+        "by numba and once with `NUMBA_DISABLE_JIT=1`: the same code as plain Python on NumPy",
+        "arrays. Seconds of the processor for one task, kernels loaded. Answers are compared byte",
+        "for byte. *First*: the first call in a process, kernels compiled, or read from the cache.",
+        "",
+        f"Machine: {runs.machine_line(data['machine'])}.",
+        "",
+        "| task | what | answers | NumPy | numba | ratio | first, no cache | first, cache |",
+        "|---|---|---|--:|--:|--:|--:|--:|",
+    ]
+    for name, (_, what) in TASKS.items():
+        same = "same" if one[name]["answers"] == two[name]["answers"] else "DIFFER"
+        slow, fast = two[name]["seconds"], one[name]["seconds"]
+        lines.append(
+            f"| {name} | {what} | {same} | {told(slow)} | {told(fast)} |"
+            f" {slow / fast:.0f} | {told(cold[name]['first'])} | {told(warm[name]['first'])} |"
+        )
+    total = [sum(entry["first"] for entry in part.values()) for part in (cold, warm)]
+    lines += [
+        "",
+        f"First calls of all tasks: {total[0]:.0f} s with an empty cache of kernels, "
+        f"{total[1]:.1f} s with a full one ({data['cache_mib']:.1f} MiB on disk). Kernels are "
+        "compiled once an installation and kept beside the modules, or in `NUMBA_CACHE_DIR`.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3])
+    parser.add_argument("--out", type=Path, default=HERE / "kernels.md")
+    parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.here:
+        print(json.dumps(tasks(options.seeds)))
+        return
+    data: dict[str, Any] = {"machine": runs.machine(), "seeds": options.seeds}
+    data["numpy"] = apart(options.seeds, NUMBA_DISABLE_JIT="1")
+    with tempfile.TemporaryDirectory() as cache:
+        data["cold"] = apart(options.seeds, NUMBA_CACHE_DIR=cache)
+        data["warm"] = apart(options.seeds, NUMBA_CACHE_DIR=cache)
+        data["numba"] = data["warm"]
+        size = sum(path.stat().st_size for path in Path(cache).rglob("*") if path.is_file())
+    data["cache_mib"] = size / 2**20
+    options.out.write_text(table(data), encoding="utf-8")
+    options.out.with_suffix(".json").write_text(json.dumps(data, indent=1) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()
