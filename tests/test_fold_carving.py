@@ -16,9 +16,10 @@ from carving_models import (
 )
 from test_fold_lattice import random_system
 
-from fabfold.fold.carving import Carving, carved_path, meetings_on, plan_carving
+from fabfold.fold.carving import Carving, carved_path, plan_carving
 from fabfold.fold.cores import CORE, core_table
 from fabfold.fold.foldability import LatticeFoldability
+from fabfold.fold.interlock import meetings_on
 from fabfold.fold.lattice import closure, find_path, free_moves
 from fabfold.fold.reference import TOUCH, turn_overlap
 from fabfold.fold.sweep import sweep_table

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.tree.system import HingeSystem
+
+if TYPE_CHECKING:
+    from fabfold.fold.lattice import Plan
 
 __all__ = ["LatticeFoldability", "octants_of"]
 
@@ -87,12 +91,7 @@ class LatticeFoldability:
         expansions : int
             The planner gives up after this many expansions without progress.
         """
-        from fabfold.fold.lattice import find_path
-
-        patience = min(expansions, self.patience)
-        return find_path(
-            self._seen(system), self.expansions, patience, short=False, carve=self.carve
-        ).apart
+        return self._look(system, expansions).apart
 
     def unresolved(self, system: HingeSystem, expansions: int) -> float:
         """Share of the quarter turns that the planner could not resolve.
@@ -108,13 +107,28 @@ class LatticeFoldability:
         float
             0.0 when it folds, up to 1.0 when nothing moves.
         """
+        found = self._look(system, expansions)
+        return found.levels / found.total if found.total else float(found.levels > 0)
+
+    def _look(self, system: HingeSystem, expansions: int) -> Plan:
+        """One look of the planner; hinges that carving would cut count as not resolved."""
         from fabfold.fold.lattice import find_path
 
         patience = min(expansions, self.patience)
+        sparing = self.carve is not None and self.material is not None
         found = find_path(
-            self._seen(system), self.expansions, patience, short=False, carve=self.carve
+            self._seen(system), self.expansions, patience, short=sparing, carve=self.carve
         )
-        return found.levels / found.total if found.total else float(found.levels > 0)
+        if found.path is None or self.material is None or self.carve is None:
+            return found
+        from fabfold.fold.carving import plan_carving
+
+        jammed = list(plan_carving(system, found.path, self.material, improve=False).jammed)
+        if not jammed:
+            return found
+        apart = found.apart.copy()
+        apart[jammed] = 1
+        return found._replace(levels=len(jammed), path=None, apart=apart)
 
     def path(self, system: HingeSystem) -> NDArray[np.int32] | None:
         """Folding path after shortcutting, or None where the planner finds none.

@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.fold.carving import Carving, Meeting, plan_carving, skin_of
+from fabfold.fold.carving import Carving, plan_carving, skin_of
+from fabfold.fold.interlock import Meeting
 from fabfold.fold.model import Motion
 from fabfold.joinery.cells import eroded_cells, occupancy
 from fabfold.tree.model import FoldTree
