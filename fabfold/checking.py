@@ -19,6 +19,8 @@ ANGLE_LIMIT_DEG = 1.0
 #: Degrees between poses that are searched for collisions, and at which the gap is measured.
 STEP_DEG = 1.0
 GAP_STEP_DEG = 10.0
+#: Most of the kit's volume that may be carved away so that cells pass each other, per cent.
+CARVED_LIMIT = 5.0
 #: Volume that bodies may share in A or B before it is more than rounding, mm³.
 _OVERLAP_MM3 = 1e-3
 
@@ -67,6 +69,8 @@ def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
             note="largest distance of a voxel from its cell after the last move",
         ),
     ]
+    if joinery.rounded_cells:
+        checks.append(_rounded(made))
     progress.update(0.1, "printability")
     checks += check_bodies(joinery, tree, motion, profile, progress)
     progress.update(0.5, "every degree of the path")
@@ -94,6 +98,22 @@ def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
         ),
     ]
     return checks
+
+
+def _rounded(made: Made) -> Check:
+    """How much was carved so that cells pass each other."""
+    joinery = made.joinery
+    lost = joinery.rounded_skin_mm3 + joinery.rounded_inside_mm3
+    share = 100.0 * lost / (lost + sum(body.volume for body in joinery.bodies))
+    return Check(
+        name="corners rounded off so that cells pass",
+        figure=round(share, 2),
+        limit=CARVED_LIMIT,
+        unit="% of the volume",
+        ok=share <= CARVED_LIMIT,
+        note=f"{joinery.rounded_cells} cells, {joinery.rounded_skin_mm3:.0f} mm³ at the model's "
+        f"surface, {joinery.rounded_inside_mm3:.0f} mm³ inside",
+    )
 
 
 def _sampled(made: Made, profile: Profile) -> list[Check]:

@@ -12,9 +12,11 @@ from joinery_models import motion_of_order, posed
 from fabfold.errors import CheckError, GeometryError
 from fabfold.fold.carving import plan_carving
 from fabfold.fold.certify import certify
+from fabfold.fold.motion import quarter_path
+from fabfold.fold.replay import replay
 from fabfold.joinery import build
 from fabfold.joinery.build import build_bodies
-from fabfold.joinery.carving import Carved, quarter_path
+from fabfold.joinery.carving import Carved
 from fabfold.joinery.placement import knuckle_zone
 from fabfold.joinery.sizes import hinge_size
 from fabfold.tree.system import hinge_system
@@ -116,6 +118,14 @@ def test_loose_material_is_joined_behind_the_cut():
     tree, motion, _, joinery = kit(SLOT, SLOT_HINGES, [0], [hole])
     assert joinery.struts > 0
     assert proof(tree, motion, joinery)["min_gap_mm"] > 0.25
+
+
+def test_replay_takes_the_cores_of_carved_cells(slot):
+    tree, motion, _, joinery = slot
+    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
+    seen = replay(tree, motion, meshes, VOXEL, joinery.origin_mm, gap_mm=0.29)
+    assert seen.max_penetration_mm == 0.0
+    assert "2 carved cells by their cores" in seen.geometry
 
 
 def test_half_a_quarter_turn_is_no_lattice_path(slot):

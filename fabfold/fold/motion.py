@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fabfold.fold.model import Motion
 from fabfold.tree.model import FoldTree
 
-__all__ = ["end_pose_error", "motion_of"]
+__all__ = ["end_pose_error", "motion_of", "quarter_path"]
 
 
 def motion_of(tree: FoldTree, path: NDArray[np.integer]) -> Motion:
@@ -49,6 +49,22 @@ def motion_of(tree: FoldTree, path: NDArray[np.integer]) -> Motion:
         angles_deg=angles,
         moves=((), *((int(hinge),) for hinge in moves[:, 0])),
     )
+
+
+def quarter_path(tree: FoldTree, motion: Motion) -> NDArray[np.int32] | None:
+    """The path as hinges and signed quarter turns about the positive axes, shape (m, 2).
+
+    None for a path that stops between two states of the lattice.
+    """
+    rows = []
+    for k in range(1, len(motion.angles_deg)):
+        for hinge in motion.moves[k]:
+            sign = sum(tree.hinges[hinge].direction)
+            turn = (motion.angles_deg[k, hinge] - motion.angles_deg[k - 1, hinge]) / 90.0 * sign
+            if abs(turn - round(turn)) > 1e-6:
+                return None
+            rows.append((hinge, round(turn)))
+    return np.array(rows, dtype=np.int32).reshape(-1, 2)
 
 
 def end_pose_error(tree: FoldTree, angles_deg: NDArray[np.float64]) -> float:

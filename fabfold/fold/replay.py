@@ -7,7 +7,7 @@ lagged behind. The proof is :mod:`fabfold.fold.certify`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import CheckError
+from fabfold.fold.cores import CORE
+from fabfold.fold.interlock import meetings_on
 from fabfold.fold.model import Motion
-from fabfold.fold.motion import end_pose_error
+from fabfold.fold.motion import end_pose_error, quarter_path
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.model import FoldTree
+from fabfold.tree.system import hinge_system
 
 if TYPE_CHECKING:
     import mujoco
@@ -75,6 +78,7 @@ def material_boxes(
     voxel_mm: float,
     origin_mm: Sequence[float],
     gap_mm: float,
+    interlocked: Collection[int] = (),
 ) -> list[tuple[int, F64, F64]]:
     """Boxes about the material that each body has in each of its cells.
 
@@ -84,6 +88,9 @@ def material_boxes(
         As for :func:`fabfold.fold.certify.certify`.
     gap_mm : float
         Boxes of neighbouring cells end this far apart.
+    interlocked : collection of int
+        Voxels that were carved so that they pass each other: a box cannot follow a round, so the
+        box is about what lies in the core of the cell.
 
     Returns
     -------
@@ -108,12 +115,13 @@ def material_boxes(
         )
         for voxel in body.voxels:
             cell = tree.source[voxel].astype(float)
+            reach = CORE if voxel in interlocked else half
             piece = solid
             for axis in range(3):
                 for sign in (1.0, -1.0):
                     normal = [0.0, 0.0, 0.0]
                     normal[axis] = sign
-                    piece = piece.trim_by_plane(normal, float(sign * cell[axis]) - half)
+                    piece = piece.trim_by_plane(normal, float(sign * cell[axis]) - reach)
             if piece.is_empty():
                 continue
             box = np.array(piece.bounding_box())
@@ -196,6 +204,14 @@ def _model(tree: FoldTree, boxes: list[tuple[int, F64, F64]]) -> mujoco.MjModel:
     return spec.compile()
 
 
+def _interlocked(tree: FoldTree, motion: Motion) -> set[int]:
+    """Voxels that run into others as whole cells, on a path from state to state of the lattice."""
+    path = quarter_path(tree, motion)
+    if path is None:
+        return set()
+    return {v for m in meetings_on(hinge_system(tree), path) for v in (m.first, m.second)}
+
+
 def replay(
     tree: FoldTree,
     motion: Motion,
@@ -210,8 +226,9 @@ def replay(
     """Fold the bodies in MuJoCo along the path.
 
     Each body is a set of boxes, one about its material in each cell (hinge barrels that stand out
-    of the cell are not simulated); a link plate is a sheet between them. The root body is held; a position motor on every hinge follows
-    the path, speeding up and slowing down smoothly in every move.
+    of the cell are not simulated); a link plate is a sheet between them. The root body is held; a
+    position motor on every hinge follows the path, speeding up and slowing down smoothly in every
+    move.
 
     Parameters
     ----------
@@ -239,7 +256,8 @@ def replay(
     told = progress or SilentProgress()
     if gap_mm is None:
         gap_mm = float(motion.certificate.get("min_gap_mm", 0.015 * voxel_mm))
-    boxes = material_boxes(tree, meshes, voxel_mm, origin_mm, gap_mm)
+    interlocked = _interlocked(tree, motion)
+    boxes = material_boxes(tree, meshes, voxel_mm, origin_mm, gap_mm, interlocked)
     model = _model(tree, boxes)
     data = mujoco.MjData(model)
     # The compiler numbers bodies depth first: ask for places by name.
@@ -277,6 +295,7 @@ def replay(
     angles = np.degrees(data.qpos[joint])
     told.update(1.0, f"deepest contact {deepest * voxel_mm:.3f} mm")
     links = sum(body.edge is not None for body in tree.bodies)
+    cores = f", {len(interlocked)} carved cells by their cores" if interlocked else ""
     sheets = f", {links} link plates as sheets between them" if links else ""
     return ReplayReport(
         max_penetration_mm=round(deepest * voxel_mm, 4),
@@ -287,8 +306,8 @@ def replay(
         steps=steps,
         geometry=(
             f"{len(boxes) - links} boxes about the material of {len(tree.bodies) - links} bodies "
-            f"in each cell, {gap_mm:g} mm apart{sheets}, hinge barrels left out; root held, no "
-            "gravity, "
+            f"in each cell, {gap_mm:g} mm apart{cores}{sheets}, hinge barrels left out; root "
+            "held, no gravity, "
             f"{seconds_per_quarter:g} s for 90°"
         ),
     )

@@ -26,6 +26,7 @@ from fabfold.errors import GeometryError
 from fabfold.fold.carving import Carving, plan_carving, skin_of
 from fabfold.fold.interlock import Meeting
 from fabfold.fold.model import Motion
+from fabfold.fold.motion import quarter_path
 from fabfold.joinery.cells import eroded_cells, occupancy
 from fabfold.tree.model import FoldTree
 from fabfold.tree.system import hinge_system
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
     Solids = list[manifold3d.Manifold]
 
-__all__ = ["Carved", "carve", "quarter_path"]
+__all__ = ["Carved", "carve"]
 
 #: Rings and slabs in the side of a voxel.
 _RINGS, _SLABS = 80, 10
@@ -88,22 +89,6 @@ class Carved:
             f"corners of {self.cells} cells rounded off so that they pass each other: "
             f"{self.skin_mm3:.0f} mm³ at the model's surface, {self.inside_mm3:.0f} mm³ inside",
         )
-
-
-def quarter_path(tree: FoldTree, motion: Motion) -> NDArray[np.int32] | None:
-    """The path as hinges and signed quarter turns about the positive axes, shape (m, 2).
-
-    None for a path that stops between two states of the lattice.
-    """
-    rows = []
-    for k in range(1, len(motion.angles_deg)):
-        for hinge in motion.moves[k]:
-            sign = sum(tree.hinges[hinge].direction)
-            turn = (motion.angles_deg[k, hinge] - motion.angles_deg[k - 1, hinge]) / 90.0 * sign
-            if abs(turn - round(turn)) > 1e-6:
-                return None
-            rows.append((hinge, round(turn)))
-    return np.array(rows, dtype=np.int32).reshape(-1, 2)
 
 
 def carve(
