@@ -14,6 +14,7 @@ from fabfold.fold.reference import (
     TOUCH,
     barrel_meetings,
     path_overlap,
+    plate_meetings,
     poses,
     state_is_valid,
     stuck,
@@ -144,6 +145,8 @@ def brute_force(system):
                 if after in seen or not state_is_valid(system, after):
                     continue
                 if turn_overlap(system, np.array(q), h, turn, 2.0).max(initial=0) > TOUCH:
+                    continue
+                if plate_meetings(system, q, h, turn, 1.0):
                     continue
                 if not barrel_meetings(system, q, h, turn, 1.0):
                     seen.add(after)

@@ -19,7 +19,7 @@ from fabfold.fold.cores import core_table
 from fabfold.fold.mechanism import Mechanism, Scene, mechanism, scene
 from fabfold.fold.planner import plan
 from fabfold.fold.shortcut import follow, shorten
-from fabfold.fold.sweep import SweepTable, sweep_table
+from fabfold.fold.sweep import SweepTable, sweep_table, with_plates
 from fabfold.fold.turns import count_stuck, movable_hinges
 from fabfold.tree.system import HingeSystem
 
@@ -68,10 +68,14 @@ def _ready(system: HingeSystem, carve: float | None = None) -> tuple[Mechanism, 
     mech = mechanism(system)
     halves = len(mech.barrel) != len(mech.up)
     if carve is None:
-        return mech, scene(mech), sweep_table(mech.span, halves=halves)
-    if halves:
+        table = sweep_table(mech.span, halves=halves)
+    elif halves:
         raise ValueError("carve: wants a system of whole cells")
-    return mech, scene(mech), core_table(mech.span, carve)
+    else:
+        table = core_table(mech.span, carve)
+    if len(mech.plate):
+        table = with_plates(table, halves=halves)
+    return mech, scene(mech), table
 
 
 def closure(system: HingeSystem, *, carve: float | None = None) -> tuple[int, int]:

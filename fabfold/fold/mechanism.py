@@ -62,6 +62,8 @@ class Mechanism(NamedTuple):
         Its translation.
     barrel : (m, 5) int32 array
         Unit lattice edges that carry hinges: hinge, axis, and twice the middle in A.
+    plate : (m, 5) int32 array
+        Unit lattice faces that are link plates: body, axis of the normal, and twice the middle.
     origin : (h,) int32 array
         Which hinge of the system this is.
     body : (b,) int32 array
@@ -83,10 +85,38 @@ class Mechanism(NamedTuple):
     turn_rotation: I32
     turn_shift: NDArray[np.int32]
     barrel: I32
+    plate: I32
     origin: I32
     body: I32
     reach: int
     span: int
+
+
+@njit(cache=True)
+def _plate(first, axis1, second, axis2, middle):  # type: ignore[no-untyped-def]
+    """Axis of the normal of the face with two given edges, -1 where there is none."""
+    side = 2 if first[axis1] % 2 == 0 else 4
+    middle[:] = first
+    if axis1 == axis2:
+        other = -1
+        for i in range(3):
+            if first[i] != second[i]:
+                if other >= 0 or i == axis1 or abs(first[i] - second[i]) != side:
+                    return -1
+                other = i
+        if other < 0:
+            return -1
+        middle[other] = (first[other] + second[other]) // 2
+        return 3 - axis1 - other
+    normal = 3 - axis1 - axis2
+    if (
+        first[normal] != second[normal]
+        or 2 * abs(first[axis1] - second[axis1]) != side
+        or 2 * abs(first[axis2] - second[axis2]) != side
+    ):
+        return -1
+    middle[axis2] = second[axis2]
+    return normal
 
 
 @njit(cache=True)
@@ -235,9 +265,38 @@ def _prepare(  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one st
             if not whole:
                 barrel[edges, 2 + ax[k]] += 2 * half - 1
             edges += 1
+
+    # A body without cells between two hinges on edges of one face is a link plate.
+    plate = np.zeros((4 * bodies, 5), np.int32)
+    faces = 0
+    middle_of = np.zeros(3, np.int32)
+    for h in range(hinges):
+        if weight[h + 1] > 0:
+            continue
+        child = -1
+        more = False
+        for g in range(h + 1, hinges):
+            if parent[g] == h + 1:
+                more = child >= 0
+                child = g
+        if child < 0 or more:
+            continue
+        normal = _plate(point2[h], axis[h], point2[child], axis[child], middle_of)
+        if normal < 0:
+            continue
+        whole = point2[h, axis[h]] % 2 == 0
+        for part in range(1 if whole else 4):
+            plate[faces, 0] = number[h + 1]
+            plate[faces, 1] = normal
+            plate[faces, 2:] = middle_of
+            if not whole:
+                plate[faces, 2 + (normal + 1) % 3] += 2 * (part % 2) - 1
+                plate[faces, 2 + (normal + 2) % 3] += 2 * (part // 2) - 1
+            faces += 1
+    plate = plate[:faces].copy()
     bodies_of = order
     return (
-        cell, first, up, end, ax, pivot, sign, steps, rotation, shift, barrel, origin,
+        cell, first, up, end, ax, pivot, sign, steps, rotation, shift, barrel, plate, origin,
         bodies_of, int(np.ceil(reach)) + 3, int(np.ceil(span)) + 2,
     )  # fmt: skip
 
@@ -293,6 +352,10 @@ class Scene(NamedTuple):
         1 + body of the cell, 0 where empty.
     edges : (3 * s * s * s,) int16 array
         1 + hinge of the lattice edge that begins at each corner, by axis; 0 where there is none.
+    face : (m, 4) int32 array
+        Unit faces of the plates: axis of the normal and twice the middle, moved likewise.
+    faces : (3 * s * s * s,) int16 array
+        1 + body of the plate on each lattice face, as `edges`; of no size where there is none.
     """
 
     rotation: I32
@@ -301,6 +364,8 @@ class Scene(NamedTuple):
     edge: I32
     grid: NDArray[np.int16]
     edges: NDArray[np.int16]
+    face: I32
+    faces: NDArray[np.int16]
 
 
 @njit(cache=True)
@@ -314,12 +379,17 @@ def scene(mech: Mechanism) -> Scene:
         np.zeros((len(mech.barrel), 4), np.int32),
         np.zeros(side * side * side, np.int16),
         np.zeros(3 * side * side * side, np.int16),
+        np.zeros((len(mech.plate), 4), np.int32),
+        np.zeros(3 * side * side * side if len(mech.plate) > 0 else 0, np.int16),
     )
 
 
 @njit(cache=True)
 def edge_slot(side: int, axis: int, x2: int, y2: int, z2: int) -> int:
-    """Index in ``Scene.edges`` of the unit edge along `axis` with the given doubled middle."""
+    """Index in ``Scene.edges`` of the unit edge along `axis` with the given doubled middle.
+
+    The same for ``Scene.faces``, with the axis of the face's normal.
+    """
     return ((axis * side + (x2 >> 1)) * side + (y2 >> 1)) * side + (z2 >> 1)
 
 
@@ -331,6 +401,8 @@ def clear_scene(mech: Mechanism, at: Scene) -> None:
         at.grid[(at.world[v, 0] * side + at.world[v, 1]) * side + at.world[v, 2]] = 0
     for e in range(len(at.edge)):
         at.edges[edge_slot(side, at.edge[e, 0], at.edge[e, 1], at.edge[e, 2], at.edge[e, 3])] = 0
+    for p in range(len(at.face)):
+        at.faces[edge_slot(side, at.face[p, 0], at.face[p, 1], at.face[p, 2], at.face[p, 3])] = 0
 
 
 @njit(cache=True)
@@ -340,7 +412,8 @@ def pose_scene(mech: Mechanism, at: Scene, q: NDArray[np.int8]) -> bool:
     Returns
     -------
     bool
-        False when two cells coincide or two barrels lie on one lattice edge.
+        False when two cells coincide, two barrels lie on one lattice edge or two plates on one
+        lattice face.
     """
     reach = mech.reach
     side = 2 * reach + 1
@@ -385,4 +458,19 @@ def pose_scene(mech: Mechanism, at: Scene, q: NDArray[np.int8]) -> bool:
         if at.edges[slot] != 0:
             good = False
         at.edges[slot] = k + 1
+    for p in range(len(mech.plate)):
+        b = mech.plate[p, 0]
+        r = at.rotation[b]
+        for i in range(3):
+            at.face[p, 1 + i] = 2 * (at.shift[b, i] + reach) + (
+                ROTATIONS[r, i, 0] * mech.plate[p, 2]
+                + ROTATIONS[r, i, 1] * mech.plate[p, 3]
+                + ROTATIONS[r, i, 2] * mech.plate[p, 4]
+            )
+            if ROTATIONS[r, i, mech.plate[p, 1]] != 0:
+                at.face[p, 0] = i
+        slot = edge_slot(side, at.face[p, 0], at.face[p, 1], at.face[p, 2], at.face[p, 3])
+        if at.faces[slot] != 0:
+            good = False
+        at.faces[slot] = b + 1
     return good

@@ -11,12 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.fold.barrels import INSET, LEAST, segment_distance
+from fabfold.fold.plates import BARREL_HALF, PLATE_CORE, PLATE_HALF, PLATE_LEAST, POST_LEAST
 from fabfold.lattice import rotation_about
 from fabfold.tree.system import HingeSystem
 
 __all__ = [
     "barrel_meetings",
     "path_overlap",
+    "plate_meetings",
+    "plates",
     "poses",
     "state_is_valid",
     "stuck",
@@ -71,12 +74,49 @@ def _barrels(system: HingeSystem, pose: NDArray[np.float64]) -> list[tuple[float
     return found
 
 
+def plates(system: HingeSystem) -> dict[int, tuple[NDArray[np.float64], int]]:
+    """Middle and axis of the normal, in A, of each body that is a link plate; on whole cells.
+
+    A link plate has no cells, and its two hinges lie on two edges of one lattice face.
+    """
+    found = {}
+    for h in range(len(system.parent)):
+        body = h + 1
+        children = np.flatnonzero(np.asarray(system.parent) == body)
+        if body in set(np.asarray(system.body).tolist()) or len(children) != 1:
+            continue
+        ends = np.asarray(system.point2)[[h, int(children[0])]] / 2.0
+        lines = np.eye(3)[np.asarray(system.axis)[[h, int(children[0])]].astype(int)]
+        for normal in range(3):
+            across = [i for i in range(3) if i != normal]
+            # The middle of a face is half a side from the middles of its edges, across them.
+            for x, y in np.ndindex(2, 2):
+                middle = ends[0].copy()
+                middle[across[0]] += (x - 0.5) * (1 - lines[0, across[0]])
+                middle[across[1]] += (y - 0.5) * (1 - lines[0, across[1]])
+                away = middle - ends
+                fits = [
+                    np.isclose(np.abs(a).sum(), 0.5)
+                    and a[normal] == 0
+                    and abs(float(a @ line)) < 1e-9
+                    and line[normal] == 0
+                    for a, line in zip(away, lines, strict=True)
+                ]
+                if all(fits) and not np.allclose(ends[0], ends[1]):
+                    found[body] = (middle, normal)
+    return found
+
+
 def state_is_valid(system: HingeSystem, quarters: NDArray[np.integer]) -> bool:
-    """Whether no two cells coincide and no two barrels lie on one lattice edge."""
+    """Whether no two cells coincide, no barrels lie on one lattice edge, no plates on one face."""
     pose = poses(system, np.asarray(quarters, dtype=float))
     cells = [tuple(cell) for cell in np.round(_cells(system, pose)).astype(int).tolist()]
     barrels = _barrels(system, pose)
-    return len(set(cells)) == len(cells) and len(set(barrels)) == len(barrels)
+    faces = [
+        tuple(np.round(2 * (pose[body] @ np.append(middle, 1.0))[:3]).astype(int).tolist())
+        for body, (middle, _) in plates(system).items()
+    ]
+    return all(len(set(things)) == len(things) for things in (cells, barrels, faces))
 
 
 def turn_overlap(
@@ -146,14 +186,14 @@ def path_overlap(
 ) -> list[float]:
     """Greatest overlap in each move of a path from A, voxel sides; see :func:`turn_overlap`.
 
-    A move that passes through a state that is not valid, or on which barrels meet, counts as
-    infinite.
+    A move that passes through a state that is not valid, or on which barrels or link plates meet
+    something, counts as infinite.
     """
     q = np.zeros(len(system.parent), dtype=int)
     found = []
     for hinge, turn in np.asarray(path, dtype=int).reshape(-1, 2).tolist():
         deep = float(turn_overlap(system, q, hinge, turn, step_deg).max(initial=-np.inf))
-        if barrel_meetings(system, q, hinge, turn):
+        if barrel_meetings(system, q, hinge, turn) or plate_meetings(system, q, hinge, turn):
             deep = np.inf
         for _ in range(abs(turn)):
             q[hinge] += 1 if turn > 0 else -1
@@ -198,6 +238,185 @@ def barrel_meetings(
     return sorted(found)
 
 
+def _plane_overlap(
+    middle: NDArray[np.float64],
+    half: tuple[float, float],
+    spin: NDArray[np.float64],
+    other: NDArray[np.float64],
+    other_half: tuple[float, float],
+) -> float:
+    """How deep a rectangle, turned by a 2 by 2 matrix, lies in another one (separating axes)."""
+    centre = spin @ middle
+    deep = np.inf
+    for normal in (*np.eye(2), spin[:, 0], spin[:, 1]):
+        reach = half[0] * abs(normal @ spin[:, 0]) + half[1] * abs(normal @ spin[:, 1])
+        reach += other_half[0] * abs(normal[0]) + other_half[1] * abs(normal[1])
+        deep = min(deep, reach - abs(float(normal @ (centre - other))))
+    return float(deep)
+
+
+def _plane_distance(
+    middle: NDArray[np.float64],
+    half: tuple[float, float],
+    spin: NDArray[np.float64],
+    other: NDArray[np.float64],
+    other_half: tuple[float, float],
+) -> float:
+    """Distance of two rectangles that do not overlap, one of them turned; of their corners."""
+
+    def outline(
+        at: NDArray[np.float64], size: tuple[float, float], turn: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        points = (at + signs * np.array(size)) @ turn.T
+        return np.stack([points, np.roll(points, -1, axis=0)], axis=1)
+
+    def apart(point: NDArray[np.float64], side: NDArray[np.float64]) -> float:
+        along = side[1] - side[0]
+        length = float(along @ along)
+        share = 0.0 if length == 0 else float(np.clip((point - side[0]) @ along / length, 0, 1))
+        return float(np.linalg.norm(point - side[0] - share * along))
+
+    one, two = outline(middle, half, spin), outline(other, other_half, np.eye(2))
+    ends = [(a[0], b) for a in one for b in two] + [(b[0], a) for a in one for b in two]
+    return min(apart(point, side) for point, side in ends)
+
+
+def plate_meetings(
+    system: HingeSystem, quarters: NDArray[np.integer], hinge: int, turn: int, step_deg: float = 0.5
+) -> list[tuple[int, int]]:
+    """Pairs of bodies (carried, staying) of which a link plate meets the other in a turn.
+
+    A plate runs into cells, into the inside of another plate, or into a barrel; a barrel counts as
+    that one of its two bodies that is nearer in the tree.
+
+    Parameters
+    ----------
+    system : HingeSystem
+        On whole cells.
+    quarters, hinge, turn, step_deg
+        As for :func:`turn_overlap`.
+    """
+    pose = poses(system, np.asarray(quarters, dtype=float))
+    inside = subtree(system, hinge)
+    frame = pose[system.parent[hinge]]
+    axis = frame[:3, :3] @ np.eye(3)[system.axis[hinge]]
+    point = (frame @ np.append(np.asarray(system.point2)[hinge] / 2.0, 1.0))[:3]
+    along = int(np.abs(axis).argmax())
+    plane = [(along + 1) % 3, (along + 2) % 3]
+    way = float(np.sign(turn) * np.sign(axis[along]))
+    angles = np.radians(np.linspace(0.0, 90.0 * abs(turn), round(90 * abs(turn) / step_deg) + 1))
+    # One kind of thing: body, (body if it is a barrel: its other one), middle, normal or line.
+    boxes: list[tuple[str, int, NDArray[np.float64], int]] = [
+        ("cell", int(body), centre, -1)
+        for body, centre in zip(np.asarray(system.body), _cells(system, pose), strict=True)
+    ]
+    flat = []
+    for body, (middle, normal) in plates(system).items():
+        where = (pose[body] @ np.append(middle, 1.0))[:3]
+        flat.append(("plate", body, where, int(np.abs(pose[body][:3, normal]).argmax())))
+    for g in range(len(system.parent)):
+        if g == hinge:
+            continue
+        where = (pose[g + 1] @ np.append(np.asarray(system.point2)[g] / 2.0, 1.0))[:3]
+        line = int(np.abs(pose[g + 1][:3, int(system.axis[g])]).argmax())
+        # Towards the hinge: what it carries is nearer from above, all else from below.
+        near = int(system.parent[g])
+        if not inside[g + 1] and subtree(system, g)[hinge + 1]:
+            near = g + 1
+        boxes.append(("barrel", near, where, line))
+    found = set()
+    for _, body, where, normal in flat:
+        for other_kind, other, there, line in boxes + flat:
+            moves = inside[body]
+            if other_kind == "barrel":
+                # Both of its bodies stay or both move, unless it is the hinge that turns.
+                if inside[other] == moves:
+                    continue
+            elif inside[other] == moves:
+                continue
+            if other_kind == "plate" and not moves:
+                continue
+            pair = (body, other) if moves else (other, body)
+            if pair in found:
+                continue
+            sense = way if moves else -way
+            if _plate_meets(
+                (where - point)[[*plane, along]],
+                [*plane, along].index(normal),
+                other_kind,
+                (there - point)[[*plane, along]],
+                -1 if line < 0 else [*plane, along].index(line),
+                sense * angles,
+            ):
+                found.add(pair)
+    return sorted(found)
+
+
+def _plate_meets(  # noqa: PLR0911 - one kind of thing after the other
+    plate: NDArray[np.float64],
+    normal: int,
+    kind: str,
+    other: NDArray[np.float64],
+    line: int,
+    angles: NDArray[np.float64],
+) -> bool:
+    """Whether a plate that turns about the third axis meets something that stays.
+
+    Parameters
+    ----------
+    plate, other : (3,) float64 arrays
+        Middles; the axis of the turn is the third one, through the origin.
+    normal : int
+        Of the plate.
+    kind : str
+        "cell", "plate" (`line` is its normal) or "barrel" (`line` is its direction).
+    angles : (a,) float64 array
+    """
+    upright = normal == 2
+    least = 0.0
+    if abs(plate[2] - other[2]) > 1e-9 or np.linalg.norm(plate[:2]) > np.linalg.norm(other[:2]) + 3:
+        return False
+    if kind == "cell":
+        if upright:
+            return False
+        mine, theirs = [0.5, 0.5], (0.5, 0.5)
+        mine[normal] = 0.0
+    elif kind == "barrel":
+        if (line == 2) == upright:
+            return False
+        least = POST_LEAST
+        mine = [PLATE_CORE, PLATE_CORE]
+        theirs = (0.0, 0.0)
+        if upright:
+            theirs = (BARREL_HALF * (line == 0), BARREL_HALF * (line == 1))
+        else:
+            mine[normal] = 0.0
+    else:
+        if (line == 2) != upright:
+            return False
+        if upright:
+            mine, theirs = [0.5, 0.5], (0.5, 0.5)
+        else:
+            least = PLATE_LEAST
+            mine = [PLATE_HALF, PLATE_HALF]
+            mine[normal] = 0.0
+            theirs = (PLATE_HALF * (line != 0), PLATE_HALF * (line != 1))
+    size = (mine[0], mine[1])
+    for angle in angles:
+        cosine, sine = np.cos(angle), np.sin(angle)
+        spin = np.array([[cosine, -sine], [sine, cosine]])
+        if least == 0.0:
+            if _plane_overlap(plate[:2], size, spin, other[:2], theirs) > TOUCH:
+                return True
+        elif (
+            _plane_overlap(plate[:2], size, spin, other[:2], theirs) > TOUCH
+            or _plane_distance(plate[:2], size, spin, other[:2], theirs) < least
+        ):
+            return True
+    return False
+
+
 def stuck(system: HingeSystem, quarters: NDArray[np.integer], way: int) -> int:
     """Closure test by the definition; see :func:`fabfold.fold.turns.count_stuck`."""
     hinges = len(system.parent)
@@ -220,6 +439,7 @@ def stuck(system: HingeSystem, quarters: NDArray[np.integer], way: int) -> int:
                 for b in (other + 1, int(system.parent[other]))
             ]
             ways.append(min(ends, key=len))
+        ways += [chain[a] ^ chain[b] for a, b in plate_meetings(system, quarters, h, turn)]
         blocked.append(ways)
     movable: set[int] = set()
     while True:

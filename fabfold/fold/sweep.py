@@ -32,8 +32,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabfold.fold.barrels import INSET, LEAST
+from fabfold.fold.meeting import segments_meet
+from fabfold.fold.plates import NO_PLATES, PlateTable, plate_table
 
-__all__ = ["SweepTable", "arcs_overlap", "sweep_table"]
+__all__ = ["SweepTable", "arcs_overlap", "sweep_table", "with_plates"]
 
 
 @njit(cache=True)
@@ -78,6 +80,8 @@ class SweepTable(NamedTuple):
         along the axis; x odd: an edge along x; y odd: along y.
     edges : (m, 2) int16 array
         Twice the middles of the edges whose barrels are met.
+    plates : PlateTable
+        What the link plates of double hinges meet; empty without :func:`with_plates`.
     """
 
     side: int
@@ -85,6 +89,7 @@ class SweepTable(NamedTuple):
     cells: NDArray[np.int16]
     edge_start: NDArray[np.int32]
     edges: NDArray[np.int16]
+    plates: PlateTable
 
 
 @njit(cache=True)
@@ -118,59 +123,13 @@ def _fill(side: int, start: NDArray[np.int32], cells: NDArray[np.int16], write: 
 
 
 @njit(cache=True)
-def _point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Distance of a point from a segment."""
-    dx = bx - ax
-    dy = by - ay
-    length = dx * dx + dy * dy
-    share = 0.0
-    if length > 0.0:
-        share = min(1.0, max(0.0, ((px - ax) * dx + (py - ay) * dy) / length))
-    return np.hypot(px - ax - share * dx, py - ay - share * dy)
-
-
-@njit(cache=True)
-def _barrels_meet(x: int, y: int, c: int, d: int, inset: float, least: float) -> bool:
-    """Whether the barrel with middle (x, y) / 2 meets that with middle (c, d) / 2 in the turn."""
-    half = 0.5 - inset
-    # Half lengths of the two axes; edges along the axis of the turn are points here.
-    mx = half if x % 2 != 0 else 0.0
-    my = half if y % 2 != 0 else 0.0
-    sx = half if c % 2 != 0 else 0.0
-    sy = half if d % 2 != 0 else 0.0
-    lever = 0.5 * np.hypot(x, y) + half
-    angle = 0.0
-    while True:
-        cosine = np.cos(angle)
-        sine = np.sin(angle)
-        ax = (0.5 * x - mx) * cosine - (0.5 * y - my) * sine
-        ay = (0.5 * x - mx) * sine + (0.5 * y - my) * cosine
-        bx = (0.5 * x + mx) * cosine - (0.5 * y + my) * sine
-        by = (0.5 * x + mx) * sine + (0.5 * y + my) * cosine
-        px = 0.5 * c - sx
-        py = 0.5 * d - sy
-        qx = 0.5 * c + sx
-        qy = 0.5 * d + sy
-        away = min(
-            _point_distance(ax, ay, px, py, qx, qy),
-            _point_distance(bx, by, px, py, qx, qy),
-            _point_distance(px, py, ax, ay, bx, by),
-            _point_distance(qx, qy, ax, ay, bx, by),
-        )
-        if away < least:  # segments that cross have been near before
-            return True
-        if angle >= 0.5 * np.pi:
-            return False
-        angle = min(0.5 * np.pi, angle + max(1e-3, (away - 0.9 * least) / lever))
-
-
-@njit(cache=True)
 def _fill_edges(
     side: int, start: NDArray[np.int32], inset: float, least: float
 ) -> NDArray[np.int16]:
     """Fill ``SweepTable.edge_start``; returns ``SweepTable.edges``."""
     edges = np.empty((1024, 2), np.int16)
     count = 0
+    half = 0.5 - inset
     for x in range(2 * side):
         for y in range(2 * side):
             radius = np.hypot(x, y)
@@ -187,7 +146,7 @@ def _fill_edges(
                         continue
                     if (c % 2 == 0 and d % 2 == 0) != along or (c % 2 != 0 and d % 2 != 0):
                         continue
-                    if _barrels_meet(x, y, c, d, inset, least):
+                    if segments_meet(x, y, half, c, d, half, least):
                         if count == len(edges):
                             wider = np.empty((2 * count, 2), np.int16)
                             wider[:count] = edges
@@ -200,14 +159,16 @@ def _fill_edges(
 
 
 @cache
-def _table(side: int, inset: float, least: float) -> SweepTable:
+def _table(side: int, halves: bool) -> SweepTable:
+    # Without the whole edge only barrels that really cross or coincide count.
+    inset, least = (0.25, 0.3) if halves else (INSET, LEAST - 1e-3)
     start = np.zeros(side * side + 1, dtype=np.int32)
     _fill(side, start, np.zeros((0, 2), dtype=np.int16), False)
     cells = np.zeros((int(start[-1]), 2), dtype=np.int16)
     _fill(side, start, cells, True)
     edge_start = np.zeros(4 * side * side + 1, dtype=np.int32)
     edges = _fill_edges(side, edge_start, inset, least)
-    return SweepTable(side, start, cells, edge_start, edges)
+    return SweepTable(side, start, cells, edge_start, edges, NO_PLATES)
 
 
 def sweep_table(reach: int, *, halves: bool = False) -> SweepTable:
@@ -223,4 +184,15 @@ def sweep_table(reach: int, *, halves: bool = False) -> SweepTable:
     side = 16
     while side < reach:
         side = side * 3 // 2 if side % 3 else side * 4 // 3
-    return _table(side, 0.25 if halves else INSET, 0.3 if halves else LEAST - 1e-3)
+    return _table(side, halves)
+
+
+def with_plates(table: SweepTable, *, halves: bool = False) -> SweepTable:
+    """The same table with what link plates meet; they are made once a side as well."""
+    return table._replace(plates=_plates(table.side, halves))
+
+
+@cache
+def _plates(side: int, halves: bool) -> PlateTable:
+    whole = _table(side, halves)
+    return plate_table(side, whole.start, whole.cells, halves=halves)

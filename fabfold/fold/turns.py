@@ -69,6 +69,147 @@ def world_turn(
 
 
 @njit(cache=True)
+def _noted(found: NDArray[np.int32], count: int, moving: int, still: int) -> int:
+    if count < len(found):
+        found[count, 0] = moving
+        found[count, 1] = still
+    return count + 1
+
+
+@njit(cache=True)
+def _barrel_pair(
+    mech: Mechanism, k: int, g: int, body: int, moving: bool, found: NDArray[np.int32], count: int
+) -> int:
+    """Note a plate and a barrel of which one moves; of the barrel's bodies, the nearer one."""
+    if g == k or (k < g and g + 1 < mech.end[k]) == moving:
+        return count
+    if not moving:
+        return _noted(found, count, mech.up[g], body)
+    inside = g + 1 <= k + 1 < mech.end[g]
+    return _noted(found, count, body, g + 1 if inside else mech.up[g])
+
+
+@njit(cache=True)
+def _inside(side: int, at: NDArray[np.int64]) -> bool:
+    return min(at[0], at[1], at[2]) >= 0 and max(at[0], at[1], at[2]) < 2 * side
+
+
+@njit(cache=True)
+def _plate_obstacles(  # noqa: PLR0911, PLR0912, PLR0915 - one plate, met by thing after thing
+    mech: Mechanism,
+    at: Scene,
+    table: SweepTable,
+    k: int,
+    p: int,
+    axis: int,
+    u: int,
+    v: int,
+    work: Work,
+    count: int,
+) -> int:
+    """Add to `work.found` what plate `p` meets while hinge `k` turns from axis u to axis v.
+
+    A plate that stays is seen from what moves: it turns the other way.
+    """
+    plates = table.plates
+    pivot, middle, found = work.pivot, work.middle, work.found
+    limit = max(1, len(found))
+    side = 2 * mech.reach + 1
+    low = k + 1
+    high = mech.end[k]
+    body = mech.plate[p, 0]
+    moving = low <= body < high
+    if not moving:
+        u, v = v, u
+    x = at.face[p, 1 + u] - pivot[u]
+    y = at.face[p, 1 + v] - pivot[v]
+    # Turn the plate into the first quadrant; (ux, uy), (vx, vy) turn what it meets back.
+    if x > 0 and y >= 0:
+        ux, uy, vx, vy = 1, 0, 0, 1
+    elif y > 0:
+        x, y, ux, uy, vx, vy = y, -x, 0, -1, 1, 0
+    elif x < 0:
+        x, y, ux, uy, vx, vy = -x, -y, -1, 0, 0, -1
+    else:
+        x, y, ux, uy, vx, vy = -y, x, 0, 1, -1, 0
+    if x * x + y * y >= 4 * table.side * table.side:
+        return count  # farther out than anything that moves
+    middle[axis] = at.face[p, 1 + axis]
+    if at.face[p, 0] != axis:
+        entry = x * 2 * table.side + y
+        for i in range(plates.cell_start[entry], plates.cell_start[entry + 1]):
+            c = 2 * plates.cells[i, 0] + 1
+            d = 2 * plates.cells[i, 1] + 1
+            middle[u] = pivot[u] + c * ux + d * uy
+            middle[v] = pivot[v] + c * vx + d * vy
+            if not _inside(side, middle):
+                continue
+            owner = at.grid[((middle[0] >> 1) * side + (middle[1] >> 1)) * side + (middle[2] >> 1)]
+            if owner != 0 and (low <= owner - 1 < high) != moving:
+                count = _noted(
+                    found, count, body if moving else owner - 1, owner - 1 if moving else body
+                )
+                if count >= limit:
+                    return count
+        for i in range(plates.post_start[entry], plates.post_start[entry + 1]):
+            c, d = plates.posts[i, 0], plates.posts[i, 1]
+            middle[u] = pivot[u] + c * ux + d * uy
+            middle[v] = pivot[v] + c * vx + d * vy
+            if not _inside(side, middle):
+                continue
+            g = at.edges[edge_slot(side, axis, middle[0], middle[1], middle[2])] - 1
+            if g >= 0:
+                count = _barrel_pair(mech, k, g, body, moving, found, count)
+                if count >= limit:
+                    return count
+        if not moving:
+            return count
+        for i in range(plates.plate_start[entry], plates.plate_start[entry + 1]):
+            c, d = plates.plates[i, 0], plates.plates[i, 1]
+            c, d = c * ux + d * uy, c * vx + d * vy
+            middle[u] = pivot[u] + c
+            middle[v] = pivot[v] + d
+            if not _inside(side, middle):
+                continue
+            normal = v if c % 2 != 0 else u
+            owner = at.faces[edge_slot(side, normal, middle[0], middle[1], middle[2])]
+            if owner != 0 and not low <= owner - 1 < high:
+                count = _noted(found, count, body, owner - 1)
+                if count >= limit:
+                    return count
+        return count
+    entry = (x >> 1) * table.side + (y >> 1)
+    for i in range(plates.edge_start[entry], plates.edge_start[entry + 1]):
+        c, d = plates.edges[i, 0], plates.edges[i, 1]
+        c, d = c * ux + d * uy, c * vx + d * vy
+        middle[u] = pivot[u] + c
+        middle[v] = pivot[v] + d
+        if not _inside(side, middle):
+            continue
+        along = u if c % 2 != 0 else v
+        g = at.edges[edge_slot(side, along, middle[0], middle[1], middle[2])] - 1
+        if g >= 0:
+            count = _barrel_pair(mech, k, g, body, moving, found, count)
+            if count >= limit:
+                return count
+    if not moving:
+        return count
+    for i in range(plates.sheet_start[entry], plates.sheet_start[entry + 1]):
+        c = 2 * plates.sheets[i, 0] + 1
+        d = 2 * plates.sheets[i, 1] + 1
+        middle[u] = pivot[u] + c * ux + d * uy
+        middle[v] = pivot[v] + c * vx + d * vy
+        if not _inside(side, middle):
+            continue
+        owner = at.faces[edge_slot(side, axis, middle[0], middle[1], middle[2])]
+        if owner != 0 and not low <= owner - 1 < high:
+            count = _noted(found, count, body, owner - 1)
+            if count >= limit:
+                return count
+    return count
+
+
+@njit(cache=True)
 def obstacles(  # noqa: PLR0912, PLR0915 - one pass, kept whole for speed
     mech: Mechanism,
     at: Scene,
@@ -172,6 +313,10 @@ def obstacles(  # noqa: PLR0912, PLR0915 - one pass, kept whole for speed
                 count += 1
                 if count >= limit:
                     return count
+    for p in range(len(at.face)):
+        count = _plate_obstacles(mech, at, table, k, p, axis, u, v, work, count)
+        if count >= limit:
+            return count
     return count
 
 

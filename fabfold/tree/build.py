@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.lattice import ROTATIONS
-from fabfold.tree.grow import energy_of
+from fabfold.tree.grow import doubles_needed, energy_of
 from fabfold.tree.model import Body, Edge, FoldTree, Hinge
 from fabfold.tree.problem import TreeProblem
-from fabfold.tree.rebuild import candidates, rooted, spanning_tree
+from fabfold.tree.rebuild import COLUMNS, candidates, hinge_rows, rooted, spanning_tree
 from fabfold.tree.system import HingeSystem
 from fabfold.tree.wedge import hinge_tables
 
@@ -27,7 +27,8 @@ class SpanningTree:
     system : HingeSystem
         The bodies and hinges for the folding kernels.
     joints : (h, 3) int32 array
-        Parent voxel, child voxel and joint type of each hinge.
+        Parent voxel, child voxel and joint type of each hinge; a double hinge has two, one after
+        the other.
     """
 
     system: HingeSystem
@@ -49,7 +50,7 @@ class HingeChoice:
     label : (n,) int32 array
         Cluster of each voxel.
     clusters : int
-    found : (k, 12) int32 array
+    found : (k, 24) int32 array
         Possible hinges, see :func:`fabfold.tree.rebuild.candidates`.
     """
 
@@ -70,29 +71,24 @@ class HingeChoice:
         self, wanted: NDArray[np.float64], generator: NDArray[np.uint64]
     ) -> SpanningTree | None:
         """One random spanning tree, or None where the hinges do not join all the clusters."""
-        hinges = self.clusters - 1
-        chosen = np.empty(hinges, np.int32)
+        chosen = np.empty(self.clusters - 1, np.int32)
         left = spanning_tree(self.found, len(self.found), self.clusters, wanted, generator, chosen)
         if left > 1:
             return None
+        hinges = self.clusters - 1 + int(self.found[chosen, 13].sum())
         body = np.empty(len(self.label), np.int32)
-        parent, row = np.empty(hinges, np.int32), np.empty(hinges, np.int32)
+        parent, joints = np.empty(hinges, np.int32), np.empty((hinges, 3), np.int32)
+        point2 = np.empty((hinges, 3), np.int32)
         axis, turns = np.empty(hinges, np.int8), np.empty(hinges, np.int8)
         rooted(
-            self.found, chosen, self.label, self.clusters, hinge_tables(),
-            body, parent, axis, turns, row,
+            self.problem.tables, self.found, chosen, self.label, self.clusters, hinge_tables(),
+            body, parent, point2, axis, turns, joints,
         )  # fmt: skip
-        from_v = row < 0
-        row = np.where(from_v, ~row, row)
-        u, v = self.found[row, 0], self.found[row, 1]
-        joints = np.stack(
-            [np.where(from_v, v, u), np.where(from_v, u, v), self.found[row, 5]], axis=1
-        )
         system = HingeSystem(
             cells=self.problem.source,
             body=body,
             parent=parent,
-            point2=np.ascontiguousarray(self.found[row, 6:9]),
+            point2=point2,
             axis=axis,
             turns=turns,
         )
@@ -102,7 +98,7 @@ class HingeChoice:
 def hinge_choice(problem: TreeProblem, pose: NDArray[np.int32]) -> HingeChoice:
     """Clusters and possible hinges of a full set of poses."""
     label = np.empty(len(problem), np.int32)
-    found = np.empty((3 * len(problem), 12), np.int32)
+    found = np.empty((hinge_rows(problem.tables), COLUMNS), np.int32)
     total, rows = candidates(problem.tables, pose, hinge_tables(), label, found)
     return HingeChoice(problem, label, total, found[:rows])
 
@@ -122,13 +118,18 @@ def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree)
     FoldTree
     """
     system = tree.system
-    bodies = len(system.parent) + 1
     target = problem.template.cells[pose // 24].astype(np.int32)
     orientation = ROTATIONS[pose % 24]
     edges = _rigid_edges(problem, pose, system.body)
     hinges = []
+    holding = set(system.body.tolist())
+    links: dict[int, int] = {}
     for h, (parent, child, _) in enumerate(tree.joints.tolist()):
-        edges.append(Edge(parent, child, "S", (h,)))
+        if h + 1 not in holding:
+            links[h + 1] = len(edges)
+            edges.append(Edge(parent, child, "D", (h, h + 1)))
+        elif int(system.parent[h]) in holding:
+            edges.append(Edge(parent, child, "S", (h,)))
         direction = [0, 0, 0]
         direction[int(system.axis[h])] = 1
         x, y, z = (system.point2[h] / 2.0).tolist()
@@ -145,8 +146,15 @@ def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree)
     first = int(np.flatnonzero(system.body == 0)[0])
     root = orientation[first]
     total, clusters = energy_of(problem.tables, pose, problem.empty_face)
-    count = problem.weights.single * (clusters - 1)
-    weight = problem.weights.surface
+    weights = problem.weights
+    least = weights.single * (clusters - 1)
+    if problem.tables.single + 1 < len(problem.joints):
+        least += (weights.double - weights.single) * int(doubles_needed(problem.tables, pose))
+    singles = sum(edge.kind == "S" for edge in edges)
+    count = weights.single * singles + weights.double * len(links)
+    total += count - least  # a hinge that cannot turn may have made a double one needful
+    weight = weights.surface
+    wished = problem.wished(pose)
     return FoldTree(
         template=problem.template,
         source=problem.source,
@@ -154,19 +162,30 @@ def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree)
         orientation=orientation.astype(np.int32),
         fill=problem.fill,
         edges=tuple(edges),
-        bodies=tuple(
-            Body(f"body-{b:02d}", tuple(np.flatnonzero(system.body == b).tolist()))
-            for b in range(bodies)
-        ),
+        bodies=_bodies(system, links),
         hinges=tuple(hinges),
         root_rotation=root.astype(np.int32),
         root_translation=(target[first] - root @ problem.source[first]).astype(np.int32),
         energy={
-            "surface": float((total - count) / weight) if weight else 0.0,
+            "surface": float((total - count - wished) / weight) if weight else 0.0,
             "count": float(count),
             "total": float(total),
+            **({} if problem.bias is None else {"wishes": wished}),
         },
     )
+
+
+def _bodies(system: HingeSystem, links: dict[int, int]) -> tuple[Body, ...]:
+    """Bodies by number; `links` has the edge of each link plate."""
+    out: list[Body] = []
+    for b in range(len(system.parent) + 1):
+        plates = sum(body.edge is not None for body in out)
+        if b in links:
+            out.append(Body(f"link-{plates:02d}", (), links[b]))
+        else:
+            held = tuple(np.flatnonzero(system.body == b).tolist())
+            out.append(Body(f"body-{b - plates:02d}", held))
+    return tuple(out)
 
 
 def _rigid_edges(

@@ -10,13 +10,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.lattice import FACES, rotation_about, rotation_index
 
-__all__ = ["Joint", "double_joints", "edge_sides", "face_transforms", "single_joints", "turn"]
+__all__ = [
+    "JOINT_SETS",
+    "Joint",
+    "JointSet",
+    "double_joints",
+    "edge_sides",
+    "face_transforms",
+    "joint_rows",
+    "single_joints",
+    "turn",
+    "ways",
+]
+
+JointSet = Literal["S", "S90", "S+D", "all"]
+#: Joints that a search may use beside rigid ones: half-turn hinges; quarter turns as well; half
+#: turns and the double hinges that keep the checkerboard colour of a cell; everything.
+JOINT_SETS: tuple[JointSet, ...] = ("S", "S90", "S+D", "all")
 
 
 @dataclass(frozen=True)
@@ -117,3 +134,60 @@ def double_joints(face: int, neighbours_only: bool = True) -> tuple[Joint, ...]:
         for j in face_transforms(face)
         if j.kind == "D" and (not neighbours_only or sum(map(abs, j.offset)) == 1)
     )
+
+
+@cache
+def ways(joint: Joint) -> tuple[tuple[int, int, int, int], ...]:
+    """Every hinge that makes the transform of a joint, simplest first.
+
+    Two axes on one edge turn like a single hinge and are left out. 24 of the 84 double hinges have
+    two ways: opposite turns about two neighbouring edges, for one, come to the same.
+
+    Parameters
+    ----------
+    joint : Joint
+
+    Returns
+    -------
+    tuple of (side, turns, side, turns)
+        The two axes of each way, parent's first; the second side is -1 for a single hinge. A
+        rigid joint has no way.
+    """
+    if joint.kind == "R":
+        return ()
+    if joint.kind == "S":
+        return ((joint.sides[0], joint.turns[0], -1, 0),)
+    found = [
+        (first, q1, second, q2)
+        for first in range(4)
+        for second in range(4)
+        for q1 in (1, 2, 3)
+        for q2 in (1, 2, 3)
+        if first != second
+        and _landing(joint.face, turn(joint.face, first, q1) @ turn(joint.face, second, q2))
+        == (joint.offset, joint.rotation)
+    ]
+    return tuple(sorted(found, key=lambda way: (way[1] + way[3], way)))
+
+
+@cache
+def joint_rows(joints: JointSet) -> tuple[tuple[Joint, ...], ...]:
+    """Joint types of a search by index, one for each face: rigid, half turns, then the others.
+
+    Parameters
+    ----------
+    joints : str
+        One of :data:`JOINT_SETS`.
+    """
+    by_face = []
+    for face in range(6):
+        row = [
+            *(joint for joint in face_transforms(face) if joint.kind == "R"),
+            *single_joints(face),
+        ]
+        if joints in ("S90", "all"):
+            row += single_joints(face, 1)
+        if joints in ("S+D", "all"):
+            row += double_joints(face, joints == "S+D")
+        by_face.append(row)
+    return tuple(zip(*by_face, strict=True))

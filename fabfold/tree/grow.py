@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import mix, random_float
 
-__all__ = ["clusters", "energy_of", "fill_beam"]
+__all__ = ["clusters", "doubles_needed", "energy_of", "fill_beam"]
 
 
 @njit(cache=True)
@@ -60,8 +60,42 @@ def keeps_whole(tables: Tables, pose: NDArray[np.int32], v: int, q: int) -> bool
 
 
 @njit(cache=True)
+def doubles_needed(tables: Tables, pose: NDArray[np.int32]) -> int:
+    """Fewest double hinges: the pieces, less one, that rigid joints and single hinges leave."""
+    if tables.single + 1 >= tables.step.shape[1]:
+        return 0
+    count = len(pose)
+    stack = np.empty(count, np.int32)
+    seen = np.zeros(count, np.bool_)
+    found = 0
+    for first in range(count):
+        if pose[first] < 0 or seen[first]:
+            continue
+        seen[first] = True
+        found += 1
+        stack[0] = first
+        top = 1
+        while top > 0:
+            top -= 1
+            u = stack[top]
+            for f in range(6):
+                v = tables.neighbour[u, f]
+                if v < 0 or pose[v] < 0 or seen[v]:
+                    continue
+                for j in range(tables.single + 1):
+                    if tables.allowed[u, f, j] and tables.step[f, j, pose[u]] == pose[v]:
+                        seen[v] = True
+                        stack[top] = v
+                        top += 1
+                        break
+    return max(0, found - 1)
+
+
+@njit(cache=True)
 def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tuple[float, int]:
     """Weighted energy of a full set of poses and its number of rigid clusters.
+
+    Clusters that single hinges alone would leave apart cost the weight of a double hinge.
 
     Parameters
     ----------
@@ -72,6 +106,9 @@ def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tup
     found = clusters(tables, pose, label)
     taken = np.zeros(len(tables.cells), np.bool_)
     total = tables.weight[1] * (found - 1)
+    if tables.single + 1 < len(tables.weight):
+        more = tables.weight[tables.single + 1] - tables.weight[1]
+        total += more * doubles_needed(tables, pose)
     for v in range(len(pose)):
         if pose[v] >= 0:
             total += np.float64(tables.cost[v, pose[v]])
@@ -118,6 +155,7 @@ def _survey(
         found = 0
         placed = 0
         waiting = 0
+        bound = False
         for f in range(6):
             u = tables.neighbour[v, f]
             if u < 0:
@@ -127,6 +165,7 @@ def _survey(
                 waiting += 1
                 continue
             placed += 1
+            bound = bound or (whole and tables.stiff[v, f])
             g = f ^ 1
             for j in range(tables.step.shape[1]):
                 if not tables.allowed[u, g, j]:
@@ -138,14 +177,18 @@ def _survey(
                 if whole and not keeps_whole(tables, pose, v, q):
                     continue
                 found += 1
+                if not flood and found >= best_key:
+                    break
                 if flood and reach[q // 24] != stamp[1]:
                     reach[q // 24] = stamp[1]
                     reach[len(taken) + seeds] = q // 24
                     seeds += 1
+            if not flood and found >= best_key:
+                break  # another voxel has fewer places
         if placed == 0:
             continue
         if found == 0:
-            if waiting == 0 and not lenient:
+            if (waiting == 0 or bound) and not lenient:
                 return -1
             continue
         key = found + priority[v]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import NoTreeError
 from fabfold.lattice import FACES, ROTATION_PRODUCT, ROTATIONS, Template, parity
-from fabfold.tree.catalogue import Joint, single_joints
+from fabfold.tree.catalogue import Joint, JointSet, joint_rows, ways
 
 if TYPE_CHECKING:
     from fabfold.voxels.features import Features
@@ -53,6 +53,13 @@ class Tables(NamedTuple):
         Pose of the child from the face, the joint and the parent's pose; -1 outside the template.
     weight : (J,) float64 array
         Energy of each joint type.
+    single : int
+        Joint types 1 to ``single`` are single hinges, those after them double ones.
+    way_start : (6, J + 1) int32 array
+        Joint j of face f is made by the rows ``way_start[f, j]`` to ``way_start[f, j + 1] - 1``
+        of `way`.
+    way : (w, 4) int32 array
+        Side and quarter turns of both axes, see :func:`fabfold.tree.catalogue.ways`.
     cost : (n, 24 m) float32 array
         Weighted energy of each voxel at each pose: Eq. 8 of the faces that the box shows, and
         whatever else was asked for (see `bias` of :func:`tree_problem`).
@@ -62,6 +69,9 @@ class Tables(NamedTuple):
     stiff : (n, 6) bool array
         Pairs that no cut may part: both voxels must keep their relative pose. No rows where
         there is no such pair.
+    hinged : (a, b, c) bool array
+        Lattice edges of the template on which hinges may lie, by twice the middle plus 1; of no
+        size where all may be used.
     exposed : (m,) uint8 array
         Bit ``f`` set where the template ends at face ``f`` of a cell.
     around : (m, 6) int32 array
@@ -75,9 +85,13 @@ class Tables(NamedTuple):
     allowed: NDArray[np.bool_]
     step: NDArray[np.int32]
     weight: NDArray[np.float64]
+    single: int
+    way_start: NDArray[np.int32]
+    way: NDArray[np.int32]
     cost: NDArray[np.float32]
     centre: NDArray[np.float32]
     stiff: NDArray[np.bool_]
+    hinged: NDArray[np.bool_]
     exposed: NDArray[np.uint8]
     around: NDArray[np.int32]
     source: NDArray[np.int32]
@@ -100,6 +114,8 @@ class TreeProblem:
     joints : tuple of J tuples of 6 Joint
         Joint types by index, one for each face of the parent; index 0 is the rigid joint.
     tables : Tables
+    bias : (n, 24 m) float32 array or None
+        What was added to the surface's energy of each voxel at each pose.
     roots : (k, 2) int32 array or None
         Voxels and their poses that growing may start from; None for all.
     """
@@ -110,27 +126,41 @@ class TreeProblem:
     weights: Weights
     joints: tuple[tuple[Joint, ...], ...]
     tables: Tables
+    bias: NDArray[np.float32] | None = None
     roots: NDArray[np.int32] | None = None
 
     def __len__(self) -> int:
         return len(self.source)
+
+    def wished(self, pose: NDArray[np.int32]) -> float:
+        """The part of the energy of a full set of poses that is `bias`."""
+        if self.bias is None:
+            return 0.0
+        return float(self.bias[np.arange(len(pose)), pose].sum(dtype=np.float64))
 
     @property
     def empty_face(self) -> float:
         """Weighted surface energy of one boundary face of an empty template cell."""
         return self.weights.surface
 
+    @property
+    def keeps_colour(self) -> bool:
+        """Whether every joint in use keeps the checkerboard colour of a cell."""
+        return all(sum(joint.offset) % 2 for by_face in self.joints for joint in by_face)
+
     def colourings(self) -> list[int]:
         """Colours (0, 1) of template cells that voxels of source colour 0 can take.
 
         Rigid joints, 180° single hinges and double hinges onto a face neighbour keep the
-        checkerboard colouring.
+        checkerboard colouring; where other joints are in use, every cell can be taken.
 
         Raises
         ------
         NoTreeError
             If the colours of the voxels fit into the template in neither way.
         """
+        if not self.keeps_colour:
+            return [0, 1]
         odd = int(parity(self.source).sum())
         voxels = (len(self.source) - odd, odd)
         cells = self.template.colours
@@ -139,8 +169,8 @@ class TreeProblem:
             raise NoTreeError(
                 f"the voxels have {voxels[0]} cells of one checkerboard colour and {voxels[1]} of "
                 f"the other, template {self.template.name!r} has {cells[0]} and {cells[1]}: hinges "
-                "keep the colour of a cell, so no tree fits; take another voxelization or a "
-                "template with room for both colours"
+                "keep the colour of a cell, so no tree fits; take another voxelization, a template "
+                "with room for both colours, or all joints"
             )
         return fits
 
@@ -175,6 +205,19 @@ def joint_table(
     around = np.stack([grid[tuple((cells + d + pad).T)] for d in FACES], axis=1)
     exposed = ((around < 0) << np.arange(6)).sum(axis=1).astype(np.uint8)
     return step, np.ascontiguousarray(around), exposed
+
+
+def _way_table(
+    joints: Sequence[Sequence[Joint]],
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    found: list[tuple[int, int, int, int]] = []
+    start = np.zeros((6, len(joints) + 1), dtype=np.int32)
+    for face in range(6):
+        for index, by_face in enumerate(joints):
+            start[face, index] = len(found)
+            found += ways(by_face[face])
+        start[face, len(joints)] = len(found)
+    return start, np.array(found, dtype=np.int32).reshape(-1, 4)
 
 
 def cost_table(
@@ -215,6 +258,8 @@ def tree_problem(
     weights: Weights | None = None,
     bias: NDArray[np.floating] | None = None,
     stiff: NDArray[np.bool_] | None = None,
+    double: NDArray[np.bool_] | None = None,
+    joints: JointSet = "S",
 ) -> TreeProblem:
     """Problem from plain arrays; :func:`from_features` takes the voxel stage's results.
 
@@ -239,6 +284,10 @@ def tree_problem(
         Energy added for a voxel at a pose, on top of the surface's.
     stiff : (k,) bool array, optional
         Pairs that no cut may part; `rigid` must hold for them.
+    double : (k,) bool array, optional
+        Whether the shared face has room for the link plate of a double hinge; by default none has.
+    joints : str
+        Joint types in use, see :data:`fabfold.tree.catalogue.JOINT_SETS`.
 
     Raises
     ------
@@ -253,20 +302,20 @@ def tree_problem(
             f"{count} voxels cannot go into template {template.name!r} of {len(template)} cells: "
             "take a larger template or a coarser grid"
         )
-    rigid_joints = tuple(
-        Joint("R", face, (), (), tuple(FACES[face].tolist()), 0) for face in range(6)
-    )
-    sides = [single_joints(face) for face in range(6)]
-    joints = (rigid_joints, *(tuple(sides[face][k] for face in range(6)) for k in range(4)))
-    step, around, exposed = joint_table(template, joints)
+    rows = joint_rows(joints)
+    step, around, exposed = joint_table(template, rows)
+    way_start, way = _way_table(rows)
+    singles = sum(by_face[0].kind == "S" for by_face in rows)
+    roomy = np.zeros(len(pairs), dtype=bool) if double is None else np.asarray(double, dtype=bool)
     neighbour = np.full((count, 6), -1, dtype=np.int32)
-    allowed = np.zeros((count, 6, len(joints)), dtype=bool)
-    for (i, j), solid, edges in zip(pairs, rigid, hinge, strict=True):
+    allowed = np.zeros((count, 6, len(rows)), dtype=bool)
+    for (i, j), solid, edges, plate in zip(pairs, rigid, hinge, roomy, strict=True):
         face = int(np.flatnonzero((cells[j] - cells[i] == FACES).all(axis=1))[0])
         # Both faces list the same edges in the same order, so one row serves either parent.
         for parent, child, side in ((i, j, face), (j, i, face ^ 1)):
             allowed[parent, side, 0] = solid
-            allowed[parent, side, 1:5] = edges
+            allowed[parent, side, 1 : singles + 1] = np.tile(edges, singles // 4)
+            allowed[parent, side, singles + 1 :] = plate
             if allowed[parent, side].any():
                 neighbour[parent, side] = child
     _require_connected(neighbour)
@@ -277,14 +326,26 @@ def tree_problem(
             face = int(np.flatnonzero((cells[j] - cells[i] == FACES).all(axis=1))[0])
             whole[i, face] = whole[j, face ^ 1] = True
             allowed[i, face, 1:] = allowed[j, face ^ 1, 1:] = False
+    hinged = np.zeros((0, 0, 0), dtype=bool)
+    if template.joints == "inside":
+        hinged = template.inside_edges()
     tables = Tables(
         neighbour=neighbour,
         allowed=allowed,
         step=step,
-        weight=np.array([weights.rigid, *([weights.single] * 4)]),
+        weight=np.array(
+            [
+                {"R": weights.rigid, "S": weights.single, "D": weights.double}[r[0].kind]
+                for r in rows
+            ]
+        ),
+        single=singles,
+        way_start=way_start,
+        way=way,
         cost=cost,
         centre=centre,
         stiff=whole if whole.any() else whole[:0],
+        hinged=hinged,
         exposed=exposed,
         around=around,
         source=cells,
@@ -297,15 +358,32 @@ def tree_problem(
         source=cells,
         fill=np.ones(count) if fill is None else np.asarray(fill, dtype=float),
         weights=weights,
-        joints=joints,
+        joints=rows,
         tables=tables,
+        bias=None if bias is None else np.asarray(bias, dtype=np.float32).reshape(count, -1),
     )
 
 
 def from_features(
-    voxels: Voxels, features: Features, template: Template, weights: Weights | None = None
+    voxels: Voxels,
+    features: Features,
+    template: Template,
+    weights: Weights | None = None,
+    *,
+    bias: NDArray[np.floating] | None = None,
+    stiff: NDArray[np.bool_] | None = None,
+    joints: JointSet = "S",
 ) -> TreeProblem:
     """Problem from a voxelization, its printable joints and a template.
+
+    Parameters
+    ----------
+    voxels, features, template, weights
+    bias : (n, 24 m) float array, optional
+    stiff : (k,) bool array, optional
+        See :func:`tree_problem`; ``k`` are the pairs of `features`.
+    joints : str
+        Joint types in use, see :data:`fabfold.tree.catalogue.JOINT_SETS`.
 
     Raises
     ------
@@ -321,6 +399,10 @@ def from_features(
         depth=features.depth,
         fill=voxels.fill,
         weights=weights,
+        bias=bias,
+        stiff=stiff,
+        double=features.double,
+        joints=joints,
     )
 
 

@@ -11,9 +11,22 @@ from numpy.typing import NDArray
 from fabfold.tree.grow import clusters
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_float
-from fabfold.tree.wedge import HingeTables, blocked
+from fabfold.tree.wedge import HingeTables, blocked, double_blocked
 
-__all__ = ["apart", "candidates", "loose_pieces", "rooted", "spanning_tree"]
+__all__ = [
+    "COLUMNS",
+    "apart",
+    "candidates",
+    "hinge_rows",
+    "loose_pieces",
+    "rooted",
+    "spanning_tree",
+]
+
+#: Columns of the table of possible hinges, see :func:`candidates`.
+COLUMNS = 24
+#: How much later than single ones double hinges are tried, against a uniform(0, 1).
+_LATER = 0.5
 
 
 @njit(cache=True)
@@ -59,16 +72,57 @@ def apart(tables: Tables, pose: NDArray[np.int32]) -> int:
 
 
 @njit(cache=True)
-def candidates(
+def _hinge_allowed(tables: Tables, q: int, d: NDArray[np.int32], n: NDArray[np.int32]) -> bool:
+    """Whether a hinge on side n of face d of the voxel at pose q may lie there in the template."""
+    if tables.hinged.shape[0] == 0:
+        return True
+    rotation = tables.rotations[q % 24]
+    at = np.empty(3, np.int32)
+    for x in range(3):
+        at[x] = 2 * tables.cells[q // 24, x] + 1
+        for y in range(3):
+            at[x] += rotation[x, y] * (d[y] + n[y])
+    return tables.hinged[at[0], at[1], at[2]]
+
+
+@njit(cache=True)
+def hinge_rows(tables: Tables) -> int:
+    """Most rows that :func:`candidates` can fill."""
+    most = 1
+    for f in range(6):
+        for j in range(tables.step.shape[1]):
+            most = max(most, tables.way_start[f, j + 1] - tables.way_start[f, j])
+    return 3 * len(tables.source) * most
+
+
+@njit(cache=True)
+def _edge_in_template(
+    tables: Tables,
+    q: int,
+    first: NDArray[np.int32],
+    second: NDArray[np.int32],
+    out: NDArray[np.int32],
+) -> None:
+    """Where half-way to ``first + second`` from the voxel at pose q comes, doubled."""
+    rotation = tables.rotations[q % 24]
+    cell = tables.cells[q // 24]
+    for x in range(3):
+        out[x] = 2 * cell[x]
+        for y in range(3):
+            out[x] += rotation[x, y] * (first[y] + second[y])
+
+
+@njit(cache=True)
+def candidates(  # noqa: PLR0912 - one row of the table after the other
     tables: Tables,
     pose: NDArray[np.int32],
     hinges: HingeTables,
     label: NDArray[np.int32],
     found: NDArray[np.int32],
 ) -> tuple[int, int]:
-    """Rigid clusters and the single hinges that could join them.
+    """Rigid clusters and the hinges that could join them.
 
-    Hinges whose half turn would run the two clusters into each other are left out.
+    Hinges whose turn would run the two clusters into each other are left out.
 
     Parameters
     ----------
@@ -77,9 +131,11 @@ def candidates(
     hinges : HingeTables
     label : (n,) int32 array
         Filled with the cluster of each voxel.
-    found : (3 n, 12) int32 array
-        Filled with one row a hinge: voxels u and v, their clusters, face of u, joint type, twice
-        the middle of its lattice edge in A (3) and in B (3).
+    found : (:func:`hinge_rows`, 24) int32 array
+        Filled with one row a hinge: 0, 1 voxels u and v; 2, 3 their clusters; 4 face of u; 5 joint
+        type; 6 to 8 twice the middle of its lattice edge in A, 9 to 11 in B; 12 its row of
+        ``Tables.way``; 13 whether it is double, and if so, 14 to 19 the edge of the second axis in
+        A and B, and 20 to 22 twice the middle of the link plate in B.
 
     Returns
     -------
@@ -97,6 +153,7 @@ def candidates(
     for v in range(count):
         member[at[label[v]]] = v
         at[label[v]] += 1
+    plate = np.empty(3, np.int32)
     rows = 0
     for u in range(count):
         for f in range(0, 6, 2):
@@ -107,33 +164,57 @@ def candidates(
             if j < 1:
                 continue
             a, b = label[u], label[v]
+            ours = member[start[a] : start[a + 1]]
+            theirs = member[start[b] : start[b + 1]]
             d = hinges.faces[f]
-            n = hinges.faces[hinges.sides[f, j - 1]]
-            if blocked(
-                tables.source,
-                member[start[a] : start[a + 1]],
-                member[start[b] : start[b + 1]],
-                tables.source[u],
-                d,
-                n,
-                hinges.swept,
-            ):
-                continue
-            found[rows, 0] = u
-            found[rows, 1] = v
-            found[rows, 2] = a
-            found[rows, 3] = b
-            found[rows, 4] = f
-            found[rows, 5] = j
-            rotation = tables.rotations[pose[u] % 24]
-            cell = tables.cells[pose[u] // 24]
-            for x in range(3):
-                found[rows, 6 + x] = 2 * tables.source[u, x] + d[x] + n[x]
-                moved = 2 * cell[x]
-                for y in range(3):
-                    moved += rotation[x, y] * (d[y] + n[y])
-                found[rows, 9 + x] = moved
-            rows += 1
+            back = hinges.faces[f ^ 1]
+            for w in range(tables.way_start[f, j], tables.way_start[f, j + 1]):
+                n = hinges.faces[hinges.sides[f, tables.way[w, 0]]]
+                turns = tables.way[w, 1]
+                double = tables.way[w, 2] >= 0
+                if not _hinge_allowed(tables, pose[u], d, n):
+                    continue
+                if not double:
+                    table = hinges.swept if turns == 2 else hinges.quarter
+                    if blocked(tables.source, ours, theirs, tables.source[u], d, n, table):
+                        continue
+                else:
+                    m = hinges.faces[hinges.sides[f, tables.way[w, 2]]]
+                    if not _hinge_allowed(tables, pose[v], back, m):
+                        continue
+                    if double_blocked(
+                        tables.source,
+                        ours,
+                        theirs,
+                        tables.source[u],
+                        d,
+                        n,
+                        turns,
+                        m,
+                        tables.way[w, 3],
+                        hinges.quarter,
+                    ):
+                        continue
+                row = found[rows]
+                row[0] = u
+                row[1] = v
+                row[2] = a
+                row[3] = b
+                row[4] = f
+                row[5] = j
+                row[12] = w
+                row[13] = double
+                for x in range(3):
+                    row[6 + x] = 2 * tables.source[u, x] + d[x] + n[x]
+                _edge_in_template(tables, pose[u], d, n, row[9:12])
+                if double:
+                    for x in range(3):
+                        row[14 + x] = 2 * tables.source[u, x] + d[x] + m[x]
+                        # The plate reaches from its first axis along -n, d, n, -d by turns.
+                        plate[x] = n[x] + (n[x] if turns == 2 else (2 - turns) * d[x])
+                    _edge_in_template(tables, pose[v], back, m, row[17:20])
+                    _edge_in_template(tables, pose[u], d, plate, row[20:23])
+                rows += 1
     return total, rows
 
 
@@ -143,6 +224,35 @@ def _root(link: NDArray[np.int32], a: int) -> int:
         link[a] = link[link[a]]
         a = link[a]
     return a
+
+
+@njit(cache=True)
+def _alike(row: NDArray[np.int32], a: int, other: NDArray[np.int32], b: int) -> bool:
+    return row[a] == other[b] and row[a + 1] == other[b + 1] and row[a + 2] == other[b + 2]
+
+
+@njit(cache=True)
+def _clash(row: NDArray[np.int32], other: NDArray[np.int32]) -> bool:
+    """Whether two hinges want one lattice edge in A or in B, one plate's face or one voxel."""
+    if _alike(row, 6, other, 6) or _alike(row, 9, other, 9):
+        return True
+    if row[13] != 0 and (_alike(row, 14, other, 6) or _alike(row, 17, other, 9)):
+        return True
+    if other[13] == 0:
+        return False
+    if _alike(row, 6, other, 14) or _alike(row, 9, other, 17):
+        return True
+    if row[13] == 0:
+        return False
+    return (
+        row[0] == other[0]
+        or row[0] == other[1]
+        or row[1] == other[0]
+        or row[1] == other[1]
+        or _alike(row, 14, other, 14)
+        or _alike(row, 17, other, 17)
+        or _alike(row, 20, other, 20)
+    )
 
 
 @njit(cache=True)
@@ -156,17 +266,17 @@ def spanning_tree(
 ) -> int:
     """Random spanning tree of the clusters.
 
-    No two of its hinges share a lattice edge segment in A or in B (paper section 4.1, joint
-    collision).
+    No two of its hinges share a lattice edge segment in A or in B, and no voxel has two double
+    hinges (paper section 4.1, joint collision). Single hinges are preferred.
 
     Parameters
     ----------
-    found : (k, 12) int32 array
+    found : (k, 24) int32 array
         From :func:`candidates`; the first `rows` rows count.
     total : int
         Number of clusters.
     wanted : (k,) float64 array
-        Hinges are tried by ascending ``wanted + uniform(0, 1)``.
+        Hinges are tried by ascending ``wanted + uniform(0, 1)``, double ones 0.5 later.
     chosen : (total - 1,) int32 array
         Filled with rows of `found`.
 
@@ -179,6 +289,8 @@ def spanning_tree(
     order = np.empty(rows)
     for i in range(rows):
         order[i] = wanted[i] + random_float(generator)
+        if found[i, 13] != 0:
+            order[i] += _LATER
     kept = 0
     for row in np.argsort(order):
         if kept == total - 1:
@@ -189,16 +301,7 @@ def spanning_tree(
             continue
         clash = False
         for i in range(kept):
-            other = chosen[i]
-            if (
-                found[row, 6] == found[other, 6]
-                and found[row, 7] == found[other, 7]
-                and found[row, 8] == found[other, 8]
-            ) or (
-                found[row, 9] == found[other, 9]
-                and found[row, 10] == found[other, 10]
-                and found[row, 11] == found[other, 11]
-            ):
+            if _clash(found[row], found[chosen[i]]):
                 clash = True
                 break
         if clash:
@@ -211,6 +314,7 @@ def spanning_tree(
 
 @njit(cache=True)
 def rooted(
+    tables: Tables,
     found: NDArray[np.int32],
     chosen: NDArray[np.int32],
     label: NDArray[np.int32],
@@ -218,21 +322,27 @@ def rooted(
     hinges: HingeTables,
     body: NDArray[np.int32],
     parent: NDArray[np.int32],
+    point2: NDArray[np.int32],
     axis: NDArray[np.int8],
     turns: NDArray[np.int8],
-    row: NDArray[np.int32],
+    joint: NDArray[np.int32],
 ) -> None:
     """Order a spanning tree from its largest cluster outwards (ties: the lower number).
 
+    The link plate of a double hinge is a body of its own, just before the child's.
+
     Parameters
     ----------
-    found, chosen, label, total
+    tables, found, chosen, label, total
         From :func:`candidates` and :func:`spanning_tree`.
     body : (n,) int32 array
         Filled with the body of each voxel; body 0 is the root.
-    parent, axis, turns, row : (total - 1,) arrays
-        Filled for each hinge: parent body, axis 0 to 2, signed quarter turns about the positive
-        axis, and its row of `found`, negative minus 1 (``~row``) where the parent is v.
+    parent, point2, axis, turns : (h,), (h, 3), (h,), (h,) arrays
+        Filled for each axis: parent body, twice the middle of its lattice edge, axis 0 to 2,
+        signed quarter turns about the positive axis. ``h`` is ``total - 1`` and one more for each
+        double hinge.
+    joint : (h, 3) int32 array
+        Filled with the parent voxel, the child voxel and the joint type.
     """
     size = np.zeros(total, np.int32)
     for v in range(len(label)):
@@ -245,38 +355,50 @@ def rooted(
             first = c
     index[first] = 0
     queue[0] = first
+    bodies = 1
     tail = 1
     head = 0
     while head < tail:
         here = queue[head]
         head += 1
         for i in range(total - 1):
-            r = chosen[i]
-            if found[r, 2] == here and index[found[r, 3]] < 0:
-                other = found[r, 3]
+            row = found[chosen[i]]
+            if row[2] == here and index[row[3]] < 0:
+                other = row[3]
                 turned = False
-            elif found[r, 3] == here and index[found[r, 2]] < 0:
-                other = found[r, 2]
+            elif row[3] == here and index[row[2]] < 0:
+                other = row[2]
                 turned = True
             else:
                 continue
-            index[other] = tail
             queue[tail] = other
-            h = tail - 1
             tail += 1
-            parent[h] = index[here]
-            side = hinges.sides[found[r, 4], found[r, 5] - 1]
-            d = hinges.faces[found[r, 4]]
-            n = hinges.faces[side]
-            d_axis = found[r, 4] >> 1
-            n_axis = side >> 1
-            axis[h] = 3 - d_axis - n_axis
-            # Component of d x n along the positive axis; seen from v the same edge turns back.
-            sign = d[d_axis] * n[n_axis]
-            if (d_axis + 1) % 3 != n_axis:
-                sign = -sign
-            turns[h] = -2 * sign if turned else 2 * sign
-            row[h] = ~r if turned else r
+            axes = 2 if row[13] != 0 else 1
+            below = index[here]
+            d = hinges.faces[row[4]]
+            d_axis = row[4] >> 1
+            for k in range(axes):
+                # Seen from v the second axis comes first.
+                which = axes - 1 - k if turned else k
+                side = hinges.sides[row[4], tables.way[row[12], 2 * which]]
+                quarters = tables.way[row[12], 2 * which + 1]
+                n_axis = side >> 1
+                h = bodies - 1
+                parent[h] = below
+                axis[h] = 3 - d_axis - n_axis
+                # Component of d x n along the positive axis; seen from v the same edge turns back.
+                sign = d[d_axis] * hinges.faces[side, n_axis]
+                if (d_axis + 1) % 3 != n_axis:
+                    sign = -sign
+                turns[h] = -quarters * sign if turned else quarters * sign
+                for x in range(3):
+                    point2[h, x] = row[6 + 8 * which + x]
+                joint[h, 0] = row[1] if turned else row[0]
+                joint[h, 1] = row[0] if turned else row[1]
+                joint[h, 2] = row[5]
+                below = bodies
+                bodies += 1
+            index[other] = below
     for v in range(len(label)):
         body[v] = index[label[v]]
 

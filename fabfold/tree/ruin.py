@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fabfold.tree.grow import clusters, energy_of, fill_beam
 from fabfold.tree.problem import Tables
-from fabfold.tree.rebuild import apart, candidates, loose_pieces
+from fabfold.tree.rebuild import COLUMNS, apart, candidates, hinge_rows, loose_pieces
 from fabfold.tree.rng import random_below, random_float
 from fabfold.tree.wedge import HingeTables
 
@@ -119,6 +119,39 @@ def ruin(
 
 
 @njit(cache=True)
+def _whole_groups(tables: Tables, pose: NDArray[np.int32], out: NDArray[np.bool_]) -> int:
+    """Take the rest of every stiff group out too: one voxel alone could only go back.
+
+    Returns
+    -------
+    int
+        Number of voxels added.
+    """
+    if len(tables.stiff) == 0:
+        return 0
+    count = len(pose)
+    stack = np.empty(count, np.int32)
+    top = 0
+    for v in range(count):
+        if out[v]:
+            stack[top] = v
+            top += 1
+    added = 0
+    while top > 0:
+        top -= 1
+        u = stack[top]
+        for f in range(6):
+            if tables.stiff[u, f]:
+                v = tables.neighbour[u, f]
+                if not out[v] and pose[v] >= 0:
+                    out[v] = True
+                    added += 1
+                    stack[top] = v
+                    top += 1
+    return added
+
+
+@njit(cache=True)
 def propose(
     tables: Tables,
     pose: NDArray[np.int32],
@@ -176,12 +209,13 @@ def propose(
     for v in range(count):
         holder[pose[v] // 24] = v
     gone = np.empty(count, np.bool_)
-    hinge = np.empty((3 * count, 12), np.int32)
+    hinge = np.empty((hinge_rows(tables), COLUMNS), np.int32)
     new_label = np.empty(count, np.int32)
     results = np.empty((width, count), np.int32)
     start = np.empty(count, np.int32)
     for attempt in range(tries):
         chosen = ruin(tables, pose, label, holder, focus, least, most, generator, gone)
+        chosen += _whole_groups(tables, pose, gone)
         if chosen >= count:
             gone[random_below(generator, count)] = False
             chosen -= 1
@@ -314,6 +348,7 @@ def repair(
     while left > 0 and used < tries:
         used += 1
         _patch(tables, pose, holder, most, generator, gone)
+        _whole_groups(tables, pose, gone)
         placed = 0
         for v in range(count):
             start[v] = -1 if gone[v] else pose[v]

@@ -176,7 +176,10 @@ class _Search:
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
         self.generator = generator(int(self.rng.integers(2**62)))
         self.scale = _scale(len(problem))
-        weight = np.array([0.0] + [self.scale.joint] * 4)
+        # Phase A has a joint weight of its own; double hinges keep their ratio to single ones.
+        weight = self.scale.joint * problem.tables.weight / max(problem.weights.single, 1e-9)
+        weight[: problem.tables.single + 1] = self.scale.joint
+        weight[0] = 0.0
         self.tables = problem.tables._replace(weight=weight)
         self.results: list[_State] = []
 

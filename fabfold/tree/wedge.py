@@ -1,7 +1,9 @@
-"""Which cells a half turn about a lattice edge sweeps, as a cheap filter on hinges.
+"""Which cells a turn about a lattice edge sweeps, as a cheap filter on hinges.
 
 Two bodies that a hinge joins directly move against each other in one way only, so a hinge is
-useless when the child's half turn would run through its parent, whatever else moves.
+useless when the child's turn would run through its parent, whatever else moves. With a link plate
+between them there are at most 16 states of the two axes, and the hinge is useless when no order of
+quarter turns leads from the first to the last.
 """
 
 # mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
@@ -18,7 +20,15 @@ from numpy.typing import NDArray
 from fabfold.lattice import FACES
 from fabfold.tree.catalogue import edge_sides
 
-__all__ = ["REACH", "HingeTables", "blocked", "half_turn_table", "hinge_tables"]
+__all__ = [
+    "REACH",
+    "HingeTables",
+    "blocked",
+    "double_blocked",
+    "half_turn_table",
+    "hinge_tables",
+    "quarter_turn_table",
+]
 
 #: Cells up to this far from the axis are tested; what lies beyond is left to the planner.
 REACH = 12
@@ -42,8 +52,8 @@ def _overlap(
 
 
 @cache
-def half_turn_table() -> NDArray[np.bool_]:
-    """Cells swept by a cell that turns by +180 degrees about the origin of the plane.
+def quarter_turn_table() -> NDArray[np.bool_]:
+    """Cells swept by a cell that turns by +90 degrees about the origin of the plane.
 
     Returns
     -------
@@ -69,6 +79,13 @@ def half_turn_table() -> NDArray[np.bool_]:
     for _ in range(3):
         turned = quarter[:, ::-1, :, ::-1].transpose(1, 0, 3, 2)
         quarter = quarter | turned
+    return np.ascontiguousarray(quarter)
+
+
+@cache
+def half_turn_table() -> NDArray[np.bool_]:
+    """As :func:`quarter_turn_table`, for a turn by +180 degrees."""
+    quarter = quarter_turn_table()
     following = quarter[::-1].transpose(1, 0, 2, 3)
     return np.ascontiguousarray(quarter | following)
 
@@ -84,18 +101,21 @@ class HingeTables(NamedTuple):
         ``FACES`` index of each edge of each face.
     swept : bool array
         :func:`half_turn_table`.
+    quarter : bool array
+        :func:`quarter_turn_table`.
     """
 
     faces: NDArray[np.int32]
     sides: NDArray[np.int32]
     swept: NDArray[np.bool_]
+    quarter: NDArray[np.bool_]
 
 
 @cache
 def hinge_tables() -> HingeTables:
-    """The tables of half-turn hinges."""
+    """The tables of hinges."""
     sides = np.array([edge_sides(face) for face in range(6)], dtype=np.int32)
-    return HingeTables(np.ascontiguousarray(FACES), sides, half_turn_table())
+    return HingeTables(np.ascontiguousarray(FACES), sides, half_turn_table(), quarter_turn_table())
 
 
 @njit(cache=True)
@@ -108,7 +128,7 @@ def blocked(
     n: NDArray[np.int32],
     table: NDArray[np.bool_],
 ) -> bool:
-    """Whether the child body runs into its parent body on a half turn.
+    """Whether the child body runs into its parent body on its turn about a single hinge.
 
     Parameters
     ----------
@@ -120,7 +140,7 @@ def blocked(
     d, n : (3,) int32 arrays
         Direction to the child voxel, and side of the hinge.
     table : bool array
-        :func:`half_turn_table`.
+        :func:`half_turn_table` or :func:`quarter_turn_table`.
     """
     reach = table.shape[0] // 2
     d_axis = 0 if d[0] != 0 else (1 if d[1] != 0 else 2)
@@ -144,3 +164,175 @@ def blocked(
             if table[a, b, x, y]:
                 return True
     return False
+
+
+@njit(cache=True)
+def _turned(
+    point: NDArray[np.int32],
+    pivot: NDArray[np.int32],
+    d: NDArray[np.int32],
+    n: NDArray[np.int32],
+    quarters: int,
+    out: NDArray[np.int32],
+) -> None:
+    """Turn a point from d to n by quarters about an edge; both are doubled."""
+    cosine = (1, 0, -1, 0)[quarters & 3]
+    sine = (0, 1, 0, -1)[quarters & 3]
+    along = 0
+    across = 0
+    for x in range(3):
+        along += (point[x] - pivot[x]) * d[x]
+        across += (point[x] - pivot[x]) * n[x]
+    u = cosine * along - sine * across
+    v = sine * along + cosine * across
+    for x in range(3):
+        out[x] = point[x] + (u - along) * d[x] + (v - across) * n[x]
+
+
+@njit(cache=True)
+def _runs_into(
+    moving: NDArray[np.int32],
+    still: NDArray[np.int32],
+    pivot: NDArray[np.int32],
+    d: NDArray[np.int32],
+    n: NDArray[np.int32],
+    table: NDArray[np.bool_],
+) -> bool:
+    """Whether cells run into others in a quarter turn from d to n; all points are doubled."""
+    reach = table.shape[0] // 2
+    for i in range(len(moving)):
+        a = 0
+        b = 0
+        for x in range(3):
+            a += (moving[i, x] - pivot[x]) * d[x]
+            b += (moving[i, x] - pivot[x]) * n[x]
+        a = ((a - 1) >> 1) + reach
+        b = ((b - 1) >> 1) + reach
+        if a < 0 or b < 0 or a >= 2 * reach or b >= 2 * reach:
+            continue
+        for k in range(len(still)):
+            e = 0
+            f = 0
+            level = True
+            for x in range(3):
+                e += (still[k, x] - pivot[x]) * d[x]
+                f += (still[k, x] - pivot[x]) * n[x]
+                if d[x] == 0 and n[x] == 0 and still[k, x] != moving[i, x]:
+                    level = False
+            if not level:
+                continue
+            e = ((e - 1) >> 1) + reach
+            f = ((f - 1) >> 1) + reach
+            if e < 0 or f < 0 or e >= 2 * reach or f >= 2 * reach:
+                continue
+            if table[a, b, e, f]:
+                return True
+    return False
+
+
+@njit(cache=True)
+def _holds(cells: NDArray[np.int32], point: NDArray[np.int32]) -> bool:
+    for i in range(len(cells)):
+        if cells[i, 0] == point[0] and cells[i, 1] == point[1] and cells[i, 2] == point[2]:
+            return True
+    return False
+
+
+@njit(cache=True)
+def double_blocked(  # noqa: PLR0912 - tables for 16 states, then the search of them
+    source: NDArray[np.int32],
+    parent_cells: NDArray[np.int32],
+    child_cells: NDArray[np.int32],
+    at: NDArray[np.int32],
+    d: NDArray[np.int32],
+    n1: NDArray[np.int32],
+    q1: int,
+    n2: NDArray[np.int32],
+    q2: int,
+    table: NDArray[np.bool_],
+) -> bool:
+    """Whether no order of quarter turns brings a double hinge from its first to its last state.
+
+    Only the two bodies and the plate between them are looked at, so a hinge that passes may still
+    be stuck.
+
+    Parameters
+    ----------
+    source, parent_cells, child_cells, at, d
+        As for :func:`blocked`.
+    n1, n2 : (3,) int32 arrays
+        Sides of the parent's and of the child's axis.
+    q1, q2 : int
+        Their quarter turns, 1 to 3.
+    table : bool array
+        :func:`quarter_turn_table`.
+    """
+    pivot1 = 2 * at + d + n1
+    pivot2 = 2 * at + d + n2
+    ahead = 2 * (at + d)
+    # Cells that the plate sweeps, quarter by quarter: against the parent, against the child.
+    plate1 = np.empty((3, 3), np.int32)
+    plate2 = np.empty((3, 3), np.int32)
+    for x in range(3):
+        plate1[0, x] = ahead[x]
+        plate1[1, x] = ahead[x] + 2 * n1[x]
+        plate1[2, x] = 2 * (at[x] + n1[x])
+        plate2[0, x] = 2 * at[x]
+        plate2[1, x] = 2 * (at[x] + n2[x])
+        plate2[2, x] = ahead[x] + 2 * n2[x]
+    parents = np.empty((len(parent_cells), 3), np.int32)
+    children = np.empty((len(child_cells), 3), np.int32)
+    for i in range(len(parent_cells)):
+        for x in range(3):
+            parents[i, x] = 2 * source[parent_cells[i], x]
+    for i in range(len(child_cells)):
+        for x in range(3):
+            children[i, x] = 2 * source[child_cells[i], x]
+    free1 = np.empty(3, np.bool_)
+    free2 = np.empty(3, np.bool_)
+    for q in range(3):
+        free1[q] = not _holds(parents, plate1[q])
+        free2[q] = not _holds(children, plate2[q])
+    for q in range(q1):
+        if not free1[q]:
+            return True
+    for q in range(q2):
+        if not free2[q]:
+            return True
+    # The child turned by its own axis, the parent turned back by its own: seen from the link.
+    child = np.empty((q2 + 1, len(children), 3), np.int32)
+    parent = np.empty((q1 + 1, len(parents), 3), np.int32)
+    for j in range(q2 + 1):
+        for i in range(len(children)):
+            _turned(children[i], pivot2, d, n2, j, child[j, i])
+    for j in range(q1 + 1):
+        for i in range(len(parents)):
+            _turned(parents[i], pivot1, d, n1, -j, parent[j, i])
+    seen = np.zeros((q1 + 1, q2 + 1), np.bool_)
+    seen[0, 0] = True
+    stack = np.empty((16, 2), np.int32)
+    stack[0] = 0
+    top = 1
+    while top > 0:
+        top -= 1
+        i, j = stack[top, 0], stack[top, 1]
+        if i == q1 and j == q2:
+            return False
+        for move in range(4):
+            a = i + (1, 0, -1, 0)[move]
+            b = j + (0, 1, 0, -1)[move]
+            if a < 0 or b < 0 or a > q1 or b > q2 or seen[a, b]:
+                continue
+            # A step back is the step forth from where it leads.
+            x = min(i, a)
+            y = min(j, b)
+            if a != i:
+                hit = _runs_into(child[j], parent[x], pivot1, d, n1, table)
+            else:
+                hit = _runs_into(child[y], parent[i], pivot2, d, n2, table)
+            if not hit:
+                seen[a, b] = True
+                stack[top, 0] = a
+                stack[top, 1] = b
+                top += 1
+    return True
