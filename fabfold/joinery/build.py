@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     import manifold3d
 
 __all__ = ["build_bodies"]
+
+#: Barrels and plates pass a cell at its faces; what takes more than this share runs through it.
+_MOST_OF_A_CELL = 0.5
 
 
 def build_bodies(
@@ -232,7 +236,9 @@ def _body(
         volume = lost.volume()
         if volume > 0.01:
             tally.carved_mm3 += volume
-            tally.carved_cells += _cells_of(lost, cells, voxel_mm)
+            names = [cut.tree.hinges[h].name for h, _ in grooves]
+            names += [cut.tree.bodies[b].name for b, _ in pockets]
+            tally.carved_cells += _count_cells(cut, lost, cells, names)
     halves = [less(cut.half(half, grooves, pockets), rounds) for half in halves]
 
     def free() -> manifold3d.Manifold:
@@ -242,12 +248,27 @@ def _body(
     return one_piece(cut.name, cells, free, material, halves, voxel_mm, tally)
 
 
-def _cells_of(solid: manifold3d.Manifold, cells: NDArray[np.int32], voxel_mm: float) -> int:
-    """Number of cells in which a solid has volume."""
+def _count_cells(
+    cut: Cut, lost: manifold3d.Manifold, cells: NDArray[np.int32], culprits: Iterable[str]
+) -> int:
+    """Number of cells in which a lost solid has volume.
+
+    Raises
+    ------
+    GeometryError
+        If it is most of a cell: the path runs through the body instead of past it.
+    """
     import manifold3d
 
     count = 0
-    cube = manifold3d.Manifold.cube((voxel_mm, voxel_mm, voxel_mm), True)
+    side = cut.voxel_mm
+    cube = manifold3d.Manifold.cube((side, side, side), True)
     for cell in cells:
-        count += (solid ^ cube.translate(tuple(cell * voxel_mm))).volume() > 0.01
+        volume = (lost ^ cube.translate(tuple(cell * side))).volume()
+        if volume > _MOST_OF_A_CELL * side**3:
+            raise GeometryError(
+                f"{cut.name}: {', '.join(dict.fromkeys(culprits))} would take "
+                f"{100 * volume / side**3:.0f} % of its cell {cell.tolist()} on the folding path"
+            )
+        count += volume > 0.01
     return int(count)

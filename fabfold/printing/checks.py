@@ -302,6 +302,8 @@ def _sizes(joinery: Joinery, tree: FoldTree, motion: Motion, profile: Profile) -
     least = int(np.argmin(volumes))
     extent = np.ptp(joinery.bodies[least].vertices, axis=0)
     smallest = joinery.bodies[least]
+    voxels = len(tree.bodies[least].voxels)
+    made_of = "a link plate" if tree.bodies[least].edge is not None else _plural(voxels, "voxel")
     # A cube of three walls: enough to clean, to find and to hold with tweezers.
     limit = (3.0 * profile.min_wall_mm) ** 3
     total = float(sum(volumes))
@@ -314,7 +316,7 @@ def _sizes(joinery: Joinery, tree: FoldTree, motion: Motion, profile: Profile) -
             limit,
             "mm³",
             bool(volumes[least] >= limit),
-            f"{smallest.name}, {_size(extent)}, {_plural(len(tree.bodies[least].voxels), 'voxel')}",
+            f"{smallest.name}, {_size(extent)}, {made_of}",
         ),
         Check(
             "material",
