@@ -304,32 +304,28 @@ def _restricted(
 def _hinged(template: Template, parts: Parts) -> NDArray[np.bool_]:
     """Lattice edges of the flat template that hinges may lie on, by twice the middle plus 1.
 
-    No two hinges may lie on one edge of the folded shape either: where edges of two parts meet, the
-    part that stays has it. Edges that two parts share are left to the creases.
+    Those that two parts share are left to the creases. Edges of two parts that only meet in the
+    folded shape stay free: to forbid half of them would cost far more trees than the few in which
+    both carry a hinge, which :func:`fabfold.fold.closing.closed` refuses.
     """
     folded = folded_template(template)
     inside = folded.inside_edges() if template.joints == "inside" else None
+    owner = np.full(2 * np.array(template.shape) + 1, -1, dtype=np.int32)
+    hinged = np.zeros(owner.shape, dtype=bool)
     corners = [np.array([a, b]) for a in (-1, 1) for b in (-1, 1)]
-    owners: dict[tuple[int, ...], set[int]] = {}
-    landings: dict[tuple[int, ...], dict[int, set[tuple[int, ...]]]] = {}
     for cell, part in zip(template.cells, parts.part.tolist(), strict=True):
         pose = parts.poses[part]
         for axis in range(3):
             for corner in corners:
                 edge = 2 * cell.astype(int)
                 edge[[k for k in range(3) if k != axis]] += corner
-                landed = 2 * (pose[:3, :3] @ (edge / 2) + pose[:3, 3] + parts.shift)
-                key, there = tuple(edge.tolist()), tuple(np.rint(landed).astype(int).tolist())
-                owners.setdefault(key, set()).add(part)
-                landings.setdefault(there, {}).setdefault(part, set()).add(key)
-    hinged = np.zeros(2 * np.array(template.shape) + 1, dtype=bool)
-    for there, found in landings.items():
-        first = min(found)
-        for key in found[first]:
-            free = len(owners[key]) == 1
-            if inside is not None:
-                free = free and bool(inside[tuple(np.array(there) + 1)])
-            hinged[tuple(np.array(key) + 1)] = free
+                at = tuple((edge + 1).tolist())
+                free = owner[at] in (-1, part)
+                owner[at] = part
+                if inside is not None:
+                    landed = 2 * (pose[:3, :3] @ (edge / 2) + pose[:3, 3] + parts.shift)
+                    free = free and bool(inside[tuple(np.rint(landed + 1).astype(int))])
+                hinged[at] = free
     return hinged
 
 
