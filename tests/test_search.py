@@ -126,6 +126,7 @@ def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, workers)
     for result in heard.done.values():
         assert result.cut == 0.0
         assert result.candidates
+        assert result.why == "", "it heard, and ended by itself"
         assert check_tree(result.candidates[0].tree) == []
 
 
