@@ -99,6 +99,65 @@ DropBelow = Annotated[
         "--drop-below", help="Drop cells with less material than this share. Default: 0.04."
     ),
 ]
+Prefer = Annotated[
+    str | None,
+    typer.Option(
+        "--prefer",
+        metavar="hinges|surface|balanced|0..1",
+        help="Fewest hinges (0), the best surface (1), or between. Default: balanced (0.5).",
+    ),
+]
+Void = Annotated[
+    str | None,
+    typer.Option(
+        "--void",
+        metavar="inside|even|surface|-1..1",
+        help="Where empty space goes: inside the box (1), at its surface (-1). Default: even (0).",
+    ),
+]
+Keep = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--keep",
+        metavar="WHAT:SIDE",
+        help="Show a part of the model on a side of the box: 'front:+x', 'top:+z' (front is the "
+        "model's -y), or a region such as 'box(0,0,50%,100%,100%,100%):top'. Repeatable.",
+    ),
+]
+KeepWeight = Annotated[
+    float | None,
+    typer.Option("--keep-weight", help="How much --keep counts; a hinge is 0.1. Default: 0.3."),
+]
+Protect = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--protect",
+        metavar="REGION",
+        help="No cut may cross this region of the model: 'sphere(x,y,z,r)', "
+        "'box(x0,y0,z0,x1,y1,z1)' in model units or with % of its extent, 'painted' or "
+        "'painted(#rrggbb)' for faces in another colour. Repeatable.",
+    ),
+]
+JointsInside = Annotated[
+    bool | None,
+    typer.Option(
+        "--joints-inside/--joints-anywhere",
+        help="No hinge on the visible faces of the box; it needs a template with some cells to "
+        "spare, and finds less. Default: anywhere.",
+        show_default=False,
+    ),
+]
+Pick = Annotated[
+    int | None,
+    typer.Option("--pick", min=0, help="Go on with this solution of 'fit --pareto'; 0 unpicks."),
+]
+Pareto = Annotated[
+    bool,
+    typer.Option(
+        "--pareto",
+        help="List the solutions between fewest joints and best surface, with a picture of each.",
+    ),
+]
 Workers = Annotated[
     int | None,
     typer.Option(
@@ -159,12 +218,24 @@ def _triple(text: str | None, option: str) -> tuple[float, float, float] | None:
     return (x, y, z)
 
 
+def _number(text: str | None) -> float | str | None:
+    """A number where the text is one, else the text."""
+    try:
+        return text if text is None else float(text)
+    except ValueError:
+        return text
+
+
 def _kit(source: str, output: Path | None, quiet: bool, **options: Any) -> Kit:
     from fabfold.console import ConsoleListener
     from fabfold.kit import open_kit
 
     for name in ("rotation", "origin"):
         options[name] = _triple(options[name], f"--{name}")
+    for name in ("keep", "protect"):
+        options[name] = options[name] or None
+    for name in ("prefer", "void"):
+        options[name] = _number(options[name])
     if output is None and not (Path(source).is_dir() or source.endswith(".toml")):
         output = Path(f"{Path(source.removeprefix('sample:')).stem}-kit")
     kit = open_kit(source, folder=output, **options)
@@ -191,16 +262,27 @@ def _stage(name: str, summary: str) -> None:
         rotation: Rotation = None,
         origin: Origin = None,
         pitch: Pitch = None,
+        prefer: Prefer = None,
+        void: Void = None,
+        keep: Keep = None,
+        keep_weight: KeepWeight = None,
+        protect: Protect = None,
+        joints_inside: JointsInside = None,
+        pick: Pick = None,
         workers: Workers = None,
         scheduler: Scheduler = None,
         time: Time = None,
+        pareto: Pareto = False,
         quiet: Quiet = False,
     ) -> None:
         options = dict(locals())
-        for key in ("name", "summary"):
+        for key in ("name", "summary", "pareto"):
             options.pop(key, None)
         options["seconds"] = options.pop("time")
         kit = _kit(**options)
+        if pareto:
+            _show_pareto(kit, name)
+            return
         kit.run(name)
         from fabfold.console import show_result
 
@@ -210,6 +292,16 @@ def _stage(name: str, summary: str) -> None:
 
     command.__name__ = name
     app.command(name, help=summary)(_guarded(command))
+
+
+def _show_pareto(kit: Kit, stage: str) -> None:
+    from fabfold.console import show_pareto
+    from fabfold.errors import RecipeError
+
+    if stage != "fit":
+        raise RecipeError(f"--pareto goes with 'fabfold fit', not with {stage!r}")
+    kit.list_pareto()
+    show_pareto(kit)
 
 
 _stage("voxelize", "Cut the model into voxels.")

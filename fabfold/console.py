@@ -24,6 +24,8 @@ _TITLES = {
     "solid": "Reading the model",
     "voxelize": "Cutting voxels",
     "fit": "Finding trees that fold",
+    "pareto": "Finding the Pareto list",
+    "pictures": "Drawing the solutions",
     "fold": "Certifying the path",
     "join": "Making bodies and hinges",
     "check": "Checking",
@@ -117,15 +119,13 @@ def _result_lines(kit: Kit, stage: str) -> list[str]:
                 f"smallest {voxels.fill.min():.0%}, {voxels.lost_volume:.1%} of the volume lost"
             )
         return lines
-    if stage in ("fit", "fold"):
-        tree, motion = kit.fold().tree, kit.fold().motion
-    else:
-        made = kit.join()
-        tree, motion = made.attempt.tree, made.attempt.motion
+    attempt = kit.fold() if stage in ("fit", "fold") else kit.join().attempt
+    tree, motion = attempt.tree, attempt.motion
     lines.append(
         f"{len(tree.source)} voxels in {len(tree.bodies)} bodies, {len(tree.hinges)} hinges, "
         f"folding into {tree.template.name} in {len(motion.moves) - 1} moves"
     )
+    lines += [str(entry["text"]) for entry in kit.granted(attempt)]
     if motion.certificate:
         lines.append(f"smallest gap on the whole path {motion.certificate['min_gap_mm']:.3f} mm")
     if stage in ("check", "export"):
@@ -140,6 +140,31 @@ def _result_lines(kit: Kit, stage: str) -> list[str]:
     if kit.folder is not None:
         lines.append(f"kit: {kit.folder}")
     return lines
+
+
+def show_pareto(kit: Kit) -> None:
+    """Print the Pareto list of a kit as a table, and where its pictures are."""
+    console = Console(highlight=False, soft_wrap=True)
+    found = kit.pareto()
+    table = Table("pick", "joints", "surface", "bodies", "moves", "preference", box=None)
+    kept = any(solution.kept is not None for solution in found)
+    if kept:
+        table.add_column("kept")
+    for number, solution in enumerate(found, start=1):
+        tree = solution.candidate.tree
+        row = [
+            str(number),
+            str(solution.joints),
+            f"{solution.surface:.2f}",
+            str(len(tree.bodies)),
+            str(len(solution.candidate.path)),
+            f"{solution.prefer:g}",
+        ]
+        table.add_row(*row, *([f"{solution.kept:.0%}"] if solution.kept is not None else []))
+    console.print(table)
+    if kit.folder is not None:
+        console.print(f"pictures: {kit.folder}/pareto-1.png and so on", markup=False)
+        console.print(f"fabfold export {kit.folder} --pick 1 goes on with the first", markup=False)
 
 
 def show_list(what: str) -> None:

@@ -24,6 +24,7 @@ from fabfold.errors import (
     KitError,
     ModelError,
     NoFoldError,
+    RecipeError,
 )
 from fabfold.files import sha256_of, write_bytes, write_text
 from fabfold.lattice import Template, rotation_about
@@ -33,11 +34,13 @@ from fabfold.store import StageStore, stage_key
 from fabfold.targets import find_input, is_file_name, load_target, named_target
 
 if TYPE_CHECKING:
+    from fabfold.pareto import Solution
     from fabfold.printing.checks import Check
     from fabfold.printing.profiles import Profile
     from fabfold.rounds import Rounds
     from fabfold.solid.model import Solid
     from fabfold.tree.solve import Candidate
+    from fabfold.tree.wishes import Wishes
     from fabfold.voxels.model import Voxels
 
 __all__ = ["Kit", "open_kit"]
@@ -95,6 +98,8 @@ class Kit:
         self._results: dict[str, Any] = {}
         self._template_file = template
         self._template: Template = load_target(recipe.template, template, recipe.template_cells)
+        if recipe.joints_inside:
+            self._template = replace(self._template, joints="inside")
         if folder is not None:
             _claim(folder)
 
@@ -185,6 +190,8 @@ class Kit:
         NoTreeError, NoFoldError
             If no round of the recipe finds one.
         """
+        if self.recipe.pick:
+            return [self._picked().candidate]
         _voxels, candidates = next(self._rounds().found())
         return candidates
 
@@ -270,7 +277,10 @@ class Kit:
         made = self.join()
         checks = self.check()
         with self.listener.stage("export") as progress:
-            write_kit(target, self.recipe, profile, self.solid(), made, checks, progress)
+            write_kit(
+                target, self.recipe, profile, self.solid(), made, checks, progress,
+                self.granted(made.attempt),
+            )  # fmt: skip
         if target != self.folder:
             if self._model is not None:
                 self._keep(self._model, self.recipe.sha256, "model", StageStore(target))
@@ -292,7 +302,8 @@ class Kit:
         made = self.join()
         writing.write_made(self.folder, made)
         if stage == "check":
-            writing.write_checks(self.folder, self.solid(), made, result)
+            granted = self.granted(made.attempt)
+            writing.write_checks(self.folder, self.solid(), made, result, granted)
 
     # How the stages hang together ---------------------------------------------------------------
 
@@ -330,13 +341,16 @@ class Kit:
         )
 
     def _join_key(self, profile: Profile) -> str:
+        from fabfold.wishes import wished
+
         recipe = self.recipe
         return stage_key(
             self._voxels_key(),
             [recipe.surface_weight, recipe.single_weight, recipe.effort, recipe.rounds],
+            *([["wished", *wished(recipe)], ["pick", recipe.pick]] if self._wishful else []),
             recipe.voxel_mm,
             profile.model_dump(mode="json"),
-            self._rounds().mark(),
+            [] if recipe.pick else self._rounds().mark(),
         )
 
     def _rounds(self) -> Rounds:
@@ -353,14 +367,94 @@ class Kit:
                 listening=self._listening,
                 scheduler=self.scheduler,
                 seconds=self.seconds,
+                wishes=self.wishes(),
             )
         result: Rounds = self._results["rounds"]
         return result
+
+    @property
+    def _wishful(self) -> bool:
+        from fabfold.wishes import wished
+
+        return bool(wished(self.recipe) or self.recipe.pick)
+
+    def wishes(self) -> Wishes:
+        """The wishes of the recipe, sampled on the model."""
+        from fabfold.wishes import make_wishes
+
+        if "wishes" not in self._results:
+            self._results["wishes"] = make_wishes(self.recipe, self.solid())
+        result: Wishes = self._results["wishes"]
+        return result
+
+    def granted(self, attempt: Attempt) -> list[dict[str, Any]]:
+        """What became of each wish in a tree, with figures and a line of text."""
+        return self.wishes().report(attempt.voxels, attempt.tree)
+
+    def pareto(self) -> list[Solution]:
+        """Trees that fold of which none is better than another in every respect.
+
+        They are numbered from 1, fewest joints first; the recipe's `pick` goes on with one of them.
+
+        Raises
+        ------
+        NoTreeError, NoFoldError
+            If no round of the recipe finds a tree that folds.
+        """
+        from fabfold.pareto import solutions
+        from fabfold.rounds import Rounds
+
+        if "pareto" not in self._results:
+            recipe = self.recipe
+            options, key, wishes = self.voxelize(), self._voxels_key(), self.wishes()
+
+            def rounds_of(recipe: Recipe, shift: int) -> Rounds:
+                return Rounds(
+                    recipe,
+                    self._template,
+                    options,
+                    key=key,
+                    store=self._store,
+                    workers=self.workers,
+                    listening=self._listening,
+                    scheduler=self.scheduler,
+                    wishes=wishes,
+                    shift=shift,
+                )
+
+            self._results["pareto"] = solutions(
+                recipe, rounds_of, self._listening, self.workers, self.scheduler
+            )
+        result: list[Solution] = self._results["pareto"]
+        return result
+
+    def list_pareto(self) -> None:
+        """Write ``pareto.json`` and a picture of each solution of the Pareto list."""
+        from fabfold.writing import write_pareto
+
+        found = self.pareto()
+        if self.folder is not None:
+            with self.listener.stage("pictures") as progress:
+                write_pareto(self.folder, found, progress)
+
+    def _picked(self) -> Solution:
+        found = self.pareto()
+        if self.recipe.pick > len(found):
+            raise RecipeError(
+                f"--pick {self.recipe.pick}: the Pareto list has {len(found)} solutions; "
+                "'fabfold fit --pareto' shows them"
+            )
+        return found[self.recipe.pick - 1]
 
     def _attempts(self) -> Iterator[Attempt]:
         """Every candidate of every round, best first, with its lattice path as a motion."""
         from fabfold.fold.motion import motion_of
 
+        if self.recipe.pick:
+            picked = self._picked()
+            tree, path = picked.candidate.tree, picked.candidate.path
+            yield Attempt(picked.voxels, tree, motion_of(tree, path))
+            return
         for voxels, candidates in self._rounds().found():
             for candidate in candidates:
                 yield Attempt(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
@@ -19,10 +20,12 @@ from fabfold.shelf import Shelf
 from fabfold.store import StageStore, stage_key
 from fabfold.tree.effort import EFFORTS
 from fabfold.tree.parts import parted
-from fabfold.tree.problem import Weights, from_features
+from fabfold.tree.problem import from_features
 from fabfold.tree.solve import Candidate
+from fabfold.tree.wishes import Wishes, rank_by_cuts, uncut_pairs
 from fabfold.voxels.features import features
 from fabfold.voxels.model import Voxels
+from fabfold.wishes import weights_of, wished
 
 __all__ = ["Rounds"]
 
@@ -43,6 +46,54 @@ def _in_order(options: Sequence[Voxels], cells: int) -> list[Voxels]:
     if cells <= LARGE:
         return list(options)
     return sorted(options, key=lambda voxels: len(voxels) > (1.0 - ROOM) * cells)
+
+
+def _usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> list[Voxels]:
+    """Voxelizations in which the wishes can come true, in their order of search.
+
+    Raises
+    ------
+    NoTreeError
+        If there is none.
+    """
+    if template.joints == "inside":
+        # The last hinge to turn brings two halves together. With all four cells around its edge
+        # full, a quarter turn before the end some of them would have been in one another.
+        roomy = [voxels for voxels in options if len(voxels) < len(template)]
+        if not roomy:
+            raise NoTreeError(
+                f"joints inside: every voxelization fills all {len(template)} cells of template "
+                f"{template.name!r}, and the last hinge to turn needs an empty cell beside it; "
+                "take a template with a few more cells, a larger --drop-below, or allow hinges "
+                "on the surface"
+            )
+        options = roomy
+    ordered = _in_order(options, len(template))
+    if wishes.regions:
+        found = [(voxels, features(voxels)) for voxels in ordered]
+        ordered = [ordered[index] for index in rank_by_cuts(wishes, found, template)]
+    return ordered
+
+
+@dataclass(frozen=True)
+class Batch:
+    """The seeds of one round, for those who run several rounds at once.
+
+    Attributes
+    ----------
+    voxels : Voxels
+    keys : dict of int to str
+        Seeds, and the digest of all that each one's result depends on.
+    known : dict of int to SeedResult
+        Those that are done.
+    job : callable
+        Makes what the seeds share.
+    """
+
+    voxels: Voxels
+    keys: dict[int, str]
+    known: dict[int, SeedResult]
+    job: Callable[[], Job]
 
 
 class Rounds:
@@ -66,6 +117,10 @@ class Rounds:
     seconds : float or None
         Search for so long, round after round, and rank all that was found; 0 takes what earlier
         runs left. None searches round by round, each to its end.
+    wishes : Wishes, optional
+        Of the recipe.
+    shift : int
+        Added to the number of each seed, for searches that run beside one another.
     """
 
     def __init__(
@@ -80,10 +135,14 @@ class Rounds:
         listening: Callable[[str], AbstractContextManager[Progress]],
         scheduler: str | None = None,
         seconds: float | None = None,
+        wishes: Wishes | None = None,
+        shift: int = 0,
     ) -> None:
         self.recipe = recipe
         self.template = template
-        self.options = _in_order(options, len(template))
+        self.wishes = wishes or Wishes()
+        self.options = _usable(options, template, self.wishes)
+        self._shift = shift
         self.workers = workers
         self.scheduler = scheduler
         self.seconds = seconds
@@ -133,7 +192,16 @@ class Rounds:
             raise NoFoldError(
                 f"no tree that folds in {self.recipe.rounds} rounds of {self.seeds_per_round} "
                 "seeds; try --effort thorough, more --rounds, another --seed or a larger template"
+                + self._about_wishes()
             )
+
+    def _about_wishes(self) -> str:
+        """What else may help, as the end of a sentence."""
+        if self.template.joints == "inside":
+            return ", or allow hinges on the surface: those inside the box seldom can fold it"
+        if self.wishes.regions:
+            return ", or protect less of the model"
+        return ""
 
     def mark(self) -> list[Any]:
         """What later stages depend on besides the recipe: the ranking, where the clock made it."""
@@ -159,7 +227,7 @@ class Rounds:
             pairs = [
                 (self._voxels((seed - first) // count), candidate)
                 for seed in sorted(results)
-                for candidate in self._closed(results[seed].candidates)
+                for candidate in self.closed(results[seed].candidates)
             ]
             self._ranked = sorted(pairs, key=lambda pair: pair[1].energy["total"])
             if results and not any(result.fits for result in results.values()):
@@ -215,20 +283,39 @@ class Rounds:
 
     def _seeds(self, number: int) -> range:
         count = self.seeds_per_round
-        first = self.recipe.seed * SEED_STRIDE + number * count
+        first = self.recipe.seed * SEED_STRIDE + self._shift + number * count
         return range(first, first + count)
 
     def _keys(self, number: int) -> dict[int, str]:
         """Digest of all that each seed of a round depends on."""
         recipe = self.recipe
         about = [recipe.surface_weight, recipe.single_weight, recipe.effort, number]
+        about += wished(recipe)
         return {seed: stage_key(self._key, *about, seed) for seed in self._seeds(number)}
+
+    def batch(self, number: int) -> Batch:
+        """The seeds of a round."""
+        keys = self._keys(number)
+        whole = {s: r for s, r in self._shelf.known(keys).items() if r.cut is None}
+        return Batch(self._voxels(number), keys, whole, lambda: self._job(number))
+
+    def keep(self, event: Event, key: str) -> None:
+        """Keep what a seed of a batch tells."""
+        self._shelf.keep(event, key)
 
     def _job(self, number: int) -> Job:
         voxels = self._voxels(number)
-        weights = Weights(surface=self.recipe.surface_weight, single=self.recipe.single_weight)
         joints = features(voxels)
-        problem = from_features(voxels, joints, self.template, weights)
+        uncut = self.wishes.uncut(voxels, joints, self.template)
+        problem = from_features(
+            voxels,
+            joints,
+            self.template,
+            weights_of(self.recipe),
+            bias=self.wishes.bias(voxels, self.template),
+            stiff=uncut_pairs(uncut, joints),
+        )
+        problem = self.wishes.apply(problem, voxels, self.template)
         if self.template.creases:
             problem = parted(problem, self._seeds(number)[0], joints.depth)
         return Job(problem, LatticeFoldability(), EFFORTS[self.recipe.effort])
@@ -260,11 +347,11 @@ class Rounds:
                     known=known,
                     hear=hear,
                 )
-        candidates = self._closed(candidates)
+        candidates = self.closed(candidates)
         self._done[number] = candidates
         return candidates
 
-    def _closed(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+    def closed(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Those that can be folded along the template's creases too, where it has any."""
         folded = (closed(candidate, self.template) for candidate in candidates)
         return [candidate for candidate in folded if candidate is not None]

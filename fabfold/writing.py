@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,22 +10,31 @@ from fabfold import __version__
 from fabfold.attempt import Attempt, Made
 from fabfold.export.colours import body_colours
 from fabfold.export.glb import write_glb
-from fabfold.export.picture import write_strip
+from fabfold.export.picture import png_bytes, write_strip
 from fabfold.export.report import write_report
+from fabfold.export.sketch import picture_of_tree
 from fabfold.export.step import write_step
 from fabfold.export.stl import write_stl
 from fabfold.export.threemf import write_3mf
-from fabfold.files import write_json, write_text
+from fabfold.files import write_bytes, write_json, write_text
+from fabfold.pareto import Solution
 from fabfold.printing.checks import Check
 from fabfold.printing.profiles import Profile
 from fabfold.progress import Progress
 from fabfold.recipe import Recipe
 from fabfold.solid.model import Solid
 
-__all__ = ["kit_summary", "write_attempt", "write_checks", "write_kit", "write_made"]
+__all__ = [
+    "kit_summary",
+    "write_attempt",
+    "write_checks",
+    "write_kit",
+    "write_made",
+    "write_pareto",
+]
 
 
-def kit_summary(solid: Solid, made: Made) -> dict[str, Any]:
+def kit_summary(solid: Solid, made: Made, granted: Sequence[dict[str, Any]] = ()) -> dict[str, Any]:
     """Figures of a kit for its report: counts, volumes, energies (JSON-ready)."""
     tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
     voxels = made.attempt.voxels
@@ -54,6 +64,7 @@ def kit_summary(solid: Solid, made: Made) -> dict[str, Any]:
         "volume_mm3": round(sum(body.volume for body in joinery.bodies), 1),
         "notes": list(joinery.notes),
         "refused_trees": list(made.refused),
+        **({"wishes": list(granted)} if granted else {}),
     }
 
 
@@ -61,6 +72,19 @@ def write_attempt(folder: Path, attempt: Attempt, voxel_mm: float) -> None:
     """Write ``tree.json`` and ``motion.json`` of a tree that is not built yet."""
     write_json(folder / "tree.json", attempt.tree.to_json(voxel_mm, (0.0, 0.0, 0.0)))
     write_json(folder / "motion.json", attempt.motion.to_json())
+
+
+def write_pareto(folder: Path, found: Sequence[Solution], progress: Progress) -> None:
+    """Write ``pareto.json`` and ``pareto-1.png`` ..., one picture for each solution."""
+    for old in sorted(folder.glob("pareto-*.png")):
+        old.unlink()
+    for number, solution in enumerate(found, start=1):
+        image = picture_of_tree(solution.voxels, solution.candidate.tree)
+        write_bytes(folder / f"pareto-{number}.png", png_bytes(image))
+        progress.update(number / len(found), f"{number} of {len(found)}")
+    entries = [solution.to_json(number) for number, solution in enumerate(found, start=1)]
+    content = {"format": "fabfold-pareto", "version": 1, "solutions": entries}
+    write_json(folder / "pareto.json", content)
 
 
 def write_made(folder: Path, made: Made) -> None:
@@ -71,9 +95,15 @@ def write_made(folder: Path, made: Made) -> None:
     write_stl(folder / "bodies", joinery)
 
 
-def write_checks(folder: Path, solid: Solid, made: Made, checks: list[Check]) -> None:
-    """Write ``report.json`` and ``report.html``."""
-    write_report(folder, checks, kit_summary(solid, made))
+def write_checks(
+    folder: Path,
+    solid: Solid,
+    made: Made,
+    checks: list[Check],
+    granted: Sequence[dict[str, Any]] = (),
+) -> None:
+    """Write ``report.json`` and ``report.html``; `granted` tells what became of each wish."""
+    write_report(folder, checks, kit_summary(solid, made, granted))
 
 
 def write_kit(
@@ -84,6 +114,7 @@ def write_kit(
     made: Made,
     checks: list[Check],
     progress: Progress,
+    granted: Sequence[dict[str, Any]] = (),
 ) -> None:
     """Write every file of the kit into `folder`.
 
@@ -97,6 +128,8 @@ def write_kit(
     made : Made
     checks : list of Check
     progress : Progress
+    granted : sequence of dict
+        What became of each wish.
     """
     tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
     name = recipe.name
@@ -127,5 +160,5 @@ def write_kit(
     upright = made.attempt.voxels.rotation.T
     write_strip(folder / "fold.png", joinery, tree, motion, colours=colours, upright=upright)
     progress.update(0.95, "report")
-    write_checks(folder, solid, made, checks)
+    write_checks(folder, solid, made, checks, granted)
     progress.update(1.0, str(folder))

@@ -155,6 +155,7 @@ def strip(
     *,
     colours: NDArray[np.uint8] | None = None,
     upright: NDArray[np.float64] | None = None,
+    between: bool = True,
 ) -> Image:
     """Shape A, the kit half-way, and shape B side by side, at one scale.
 
@@ -169,6 +170,8 @@ def strip(
     upright : (3, 3) float64 array, optional
         See :func:`picture_of_kit`. After A the nearest rotation along the lattice is taken, so
         that the box stands straight.
+    between : bool
+        Show the kit half-way too.
 
     Returns
     -------
@@ -176,11 +179,9 @@ def strip(
     """
     view = view or View(size=(560, 560))
     stand = None if upright is None else _nearest_lattice(upright)
-    states = [
-        (motion.angles_deg[0], upright),
-        (halfway(motion), stand),
-        (motion.angles_deg[-1], stand),
-    ]
+    states = [(motion.angles_deg[0], upright), (motion.angles_deg[-1], stand)]
+    if between:
+        states.insert(1, (halfway(motion), stand))
     clouds = []
     for angles, turn in states:
         poses = _poses_mm(joinery, tree, angles, turn)

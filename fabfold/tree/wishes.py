@@ -22,7 +22,16 @@ from fabfold.voxels.features import Features
 from fabfold.voxels.model import Voxels
 from fabfold.voxels.regions import Area, Region, owners
 
-__all__ = ["Keep", "Kept", "Uncut", "Wishes", "faces_shown", "rank_by_cuts", "uncut_pairs"]
+__all__ = [
+    "Keep",
+    "Kept",
+    "Uncut",
+    "Wishes",
+    "faces_shown",
+    "hinges_outside",
+    "rank_by_cuts",
+    "uncut_pairs",
+]
 
 #: Share of a protected piece that may lie in slivers beyond a cut.
 SLIVERS = 0.01
@@ -227,6 +236,22 @@ class Wishes:
         """
         return [_uncut(region, voxels, features, template) for region in self.regions]
 
+    def report(self, voxels: Voxels, tree: FoldTree) -> list[dict[str, Any]]:
+        """What became of each wish: its words, its figures and a line of text (JSON-ready)."""
+        found: list[dict[str, Any]] = []
+        for kept in self.kept(voxels, tree):
+            figures = {"share": round(kept.share, 4), "voxels": kept.voxels, "of": kept.of}
+            found.append({"wish": f"keep {kept.text}", **figures, "text": str(kept)})
+        for region in self.regions:
+            found.append(_protected(region, voxels, tree))
+        if self.void:
+            found.append(_emptiness(tree))
+        if tree.template.joints == "inside":
+            outside = hinges_outside(tree)
+            text = f"joints inside: {outside} of {len(tree.hinges)} hinges lie on the surface"
+            found.append({"wish": "joints inside", "outside": outside, "text": text})
+        return found
+
     def apply(self, problem: TreeProblem, voxels: Voxels, template: Template) -> TreeProblem:
         """The problem with the places where growing shall begin."""
         if problem.roots is not None or not self.keeps:
@@ -250,6 +275,64 @@ def faces_shown() -> NDArray[np.int64]:
     return np.array(
         [[int(np.flatnonzero((d @ r == FACES).all(axis=1))[0]) for d in FACES] for r in ROTATIONS]
     )
+
+
+def hinges_outside(tree: FoldTree) -> int:
+    """Hinges that the folded box shows: a cell around their edge is no cell of the template."""
+    cells = {tuple(cell) for cell in tree.template.cells.tolist()}
+    root = np.eye(4)
+    root[:3, :3], root[:3, 3] = tree.root_rotation, tree.root_translation
+    poses = root @ tree.body_poses(tree.fold_angles)
+    outside = 0
+    for hinge in tree.hinges:
+        pose = poses[hinge.parent]
+        middle = pose[:3, :3] @ np.array(hinge.point) + pose[:3, 3]
+        along = np.abs(pose[:3, :3] @ np.array(hinge.direction)).round().astype(bool)
+        one, other = np.eye(3)[~along] / 2
+        around = [middle + a * one + b * other for a in (1, -1) for b in (1, -1)]
+        outside += any(tuple(np.rint(c).astype(int).tolist()) not in cells for c in around)
+    return outside
+
+
+def _protected(region: Region, voxels: Voxels, tree: FoldTree) -> dict[str, Any]:
+    body = tree.voxel_body
+    names: list[str] = []
+    shares: list[float] = []
+    for points in region.pieces:
+        holder = owners(voxels, points)
+        counts = np.bincount(body[holder[holder >= 0]], minlength=len(tree.bodies))
+        if counts.any():
+            names.append(tree.bodies[int(counts.argmax())].name)
+            shares.append(float(counts.max() / counts.sum()))
+    share = min(shares, default=1.0)
+    where = ", ".join(dict.fromkeys(names)) or "nothing that is printed"
+    return {
+        "wish": f"protect {region.text}",
+        "bodies": names,
+        "share": round(share, 4),
+        "text": f"protect {region.text}: {share:.1%} of it whole, in {where}",
+    }
+
+
+def _emptiness(tree: FoldTree) -> dict[str, Any]:
+    on_side = _open(tree.template)
+    visible = {
+        tuple(cell)
+        for cell, open_ in zip(
+            tree.template.cells.tolist(), np.any(on_side, axis=1).tolist(), strict=True
+        )
+        if open_
+    }
+    full = {tuple(cell): float(f) for cell, f in zip(tree.target.tolist(), tree.fill, strict=True)}
+    empty = [0.0, 0.0]
+    for cell in tree.template.cells.tolist():
+        empty[tuple(cell) in visible] += 1.0 - full.get(tuple(cell), 0.0)
+    return {
+        "wish": "void",
+        "inside": round(empty[0], 3),
+        "surface": round(empty[1], 3),
+        "text": f"empty space: {empty[0]:.2f} cells inside the box, {empty[1]:.2f} at its surface",
+    }
 
 
 def _open(template: Template) -> NDArray[np.bool_]:
