@@ -27,7 +27,7 @@ from fabfold.voxels.features import features
 from fabfold.voxels.model import Voxels
 from fabfold.wishes import weights_of, wished
 
-__all__ = ["Rounds"]
+__all__ = ["Rounds", "search_order"]
 
 #: Seeds in one round; constants, so that results do not depend on the workers.
 SEEDS_PER_ROUND = 4
@@ -41,7 +41,7 @@ ROOM = 0.06
 SEED_STRIDE = 10_000
 
 
-def _in_order(options: Sequence[Voxels], cells: int) -> list[Voxels]:
+def search_order(options: Sequence[Voxels], cells: int) -> list[Voxels]:
     """Order of search: best first, but those that leave a large template some room before."""
     if cells <= LARGE:
         return list(options)
@@ -68,7 +68,7 @@ def _usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> li
                 "on the surface"
             )
         options = roomy
-    ordered = _in_order(options, len(template))
+    ordered = search_order(options, len(template))
     if wishes.regions:
         found = [(voxels, features(voxels)) for voxels in ordered]
         ordered = [ordered[index] for index in rank_by_cuts(wishes, found, template)]
