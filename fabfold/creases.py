@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fabfold.lattice import Crease, IntArray, Template, rotation_about
 
-__all__ = ["Parts", "check_creases", "parts_of"]
+__all__ = ["Parts", "check_creases", "folded_template", "line_of", "parts_of", "rim_of"]
 
 
 @dataclass(frozen=True)
@@ -179,5 +179,8 @@ def folded_template(template: Template) -> Template:
     """The shape that a template with creases ends in; a template without any is itself."""
     if not template.creases:
         return template
-    landed = parts_of(template).landed(template.cells)
-    return Template(f"{template.name}-folded", landed)
+    folded = Template(f"{template.name}-folded", parts_of(template).landed(template.cells))
+    if len(folded) == np.prod(folded.shape):
+        name = "box-" + "x".join(str(side) for side in folded.shape)
+        return Template(name, folded.cells, joints=template.joints)
+    return Template(folded.name, folded.cells, joints=template.joints)
