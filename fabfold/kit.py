@@ -163,6 +163,7 @@ class Kit:
 
         recipe = self.recipe
         solid = self.solid()
+        regions = self.wishes().regions
 
         def make(progress: Progress) -> list[Voxels]:
             found = voxelize(
@@ -173,6 +174,7 @@ class Kit:
                 origin=recipe.origin,
                 pitch=recipe.pitch,
                 drop_below=recipe.drop_below,
+                regions=regions,
                 progress=progress,
             )
             progress.update(1.0, f"{len(found[0])} voxels")
@@ -338,6 +340,7 @@ class Kit:
             self._template.content,
             recipe.seed,
             [recipe.rotation, recipe.origin, recipe.pitch, recipe.drop_below],
+            *([list(recipe.protect)] if recipe.protect else []),
         )
 
     def _join_key(self, profile: Profile) -> str:

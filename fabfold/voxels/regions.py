@@ -10,7 +10,9 @@ radius. A side is ``front``, ``back``, ``left``, ``right``, ``bottom`` or ``top`
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,9 @@ from fabfold.errors import RecipeError
 from fabfold.lattice import FACES
 from fabfold.solid.model import Solid
 from fabfold.voxels.model import Voxels
+
+if TYPE_CHECKING:
+    from fabfold.voxels.cut import Placement
 
 __all__ = [
     "Area",
@@ -30,6 +35,7 @@ __all__ = [
     "parse_keep",
     "parse_shape",
     "region_of",
+    "spread",
     "to_lattice",
 ]
 
@@ -45,6 +51,8 @@ _REGION_STEPS = 40
 _VIEW_STEPS = 160
 #: Pieces of a region with less than this share of its material are no pieces of their own.
 _CRUMB = 0.01
+#: Price of a cell more for a region, in full cells: that of a sliver.
+_CUT_COST = 0.5
 #: Most of the samples of painted faces along the model's longest side.
 _PAINT_STEPS = 400
 
@@ -401,6 +409,22 @@ def _seen_from(solid: Solid, side: int) -> Area:
         np.tile(FACES[side].astype(float), (len(cells), 1)),
         np.full(len(cells), step**2),
     )
+
+
+def spread(regions: Sequence[Region], placement: Placement) -> float:
+    """Price of the cells into which a placement of the grid divides regions, 0.5 for each cut."""
+    cuts = 0
+    for region in regions:
+        for points in region.pieces:
+            some = points[:: max(1, len(points) // 2000)]
+            at = (some @ placement.rotation.T - placement.origin) / placement.pitch
+            cell = np.empty(at.shape, dtype=np.int64)
+            for axis, offsets in enumerate(placement.offsets):
+                planes = placement.first[axis] - 0.5 + np.arange(len(offsets)) + offsets
+                cell[:, axis] = np.searchsorted(planes, at[:, axis])
+            sizes = np.unique(cell, axis=0, return_counts=True)[1]
+            cuts += int((sizes >= _CRUMB * len(some)).sum()) - 1
+    return _CUT_COST * cuts
 
 
 def to_lattice(voxels: Voxels, points: Points) -> Points:

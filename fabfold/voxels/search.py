@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -13,6 +15,7 @@ from fabfold.voxels.cut import cut_voxels
 from fabfold.voxels.model import SUBDIVISION, Voxels
 from fabfold.voxels.offsets import CellEnergy
 from fabfold.voxels.placement import grid_rotations
+from fabfold.voxels.regions import Region, spread
 from fabfold.voxels.rounds import PITCHES, Ranked, Rounds, Tried
 
 __all__ = ["MAX_LOSS", "voxelize"]
@@ -45,6 +48,7 @@ def voxelize(
     drop_below: float = 0.04,
     max_offset: int = 4,
     max_loss: float = MAX_LOSS,
+    regions: Sequence[Region] = (),
     progress: Progress | None = None,
 ) -> list[Voxels]:
     """Cut a solid into voxels that the template can hold.
@@ -74,6 +78,8 @@ def voxelize(
         Twentieths of a voxel by which a plane may move and a spacing change, 0 to 4.
     max_loss : float
         Largest share of the model's volume that may be lost in dropped cells.
+    regions : sequence of Region
+        That shall lie in few cells; each cell more costs as much as a sliver.
     progress : Progress, optional
 
     Returns
@@ -133,7 +139,10 @@ def voxelize(
             found.extend(rounds.third(tried))
         found.sort(key=lambda tried: tried.order)
         progress.update(0.8, "pitch refined")
-    return _finish(rounds, found, results, max_loss, progress)
+    if regions:
+        price = {id(tried): spread(regions, tried.placement) for tried in found}
+        found.sort(key=lambda tried: (tried.order[0], tried.order[1] + price[id(tried)]))
+    return _finish(rounds, found, results, max_loss, progress, regions)
 
 
 def _check_numbers(
@@ -257,10 +266,16 @@ def _shortlist(rounds: Rounds, found: list[Tried], count: int) -> list[Tried]:
 
 
 def _finish(
-    rounds: Rounds, found: list[Tried], results: int, max_loss: float, progress: Progress
+    rounds: Rounds,
+    found: list[Tried],
+    results: int,
+    max_loss: float,
+    progress: Progress,
+    regions: Sequence[Region],
 ) -> list[Voxels]:
     """Cut the best placements and check them."""
     done: list[Voxels] = []
+    price: list[float] = []
     nearest = ""
     # Sampling the warped model can still cost a cell its place, so some more than are wanted.
     for tried in _shortlist(rounds, found, 2 * results) or found[:results]:
@@ -278,6 +293,7 @@ def _finish(
             )
         else:
             done.append(voxels)
+            price.append(spread(regions, tried.placement) - voxels.energy["score"])
             progress.update(0.8 + 0.2 * len(done) / results, f"{len(voxels)} voxels")
     if not done:
         even, odd = rounds.capacity.colours
@@ -286,6 +302,6 @@ def _finish(
             f"by checkerboard colour); the best has {nearest or 'no cell with enough material'}. "
             "Try a larger pitch or template, another seed, more placements, or a thicker model"
         )
-    done.sort(key=lambda voxels: -voxels.energy["score"])
+    done = [done[place] for place in np.argsort(price, kind="stable").tolist()]
     progress.update(1.0, f"{len(done)} voxelizations")
     return done
