@@ -14,7 +14,7 @@ from fabfold.fold.model import Motion
 from fabfold.joinery.model import BodyMesh, Joinery
 from fabfold.printing.checks import Check
 from fabfold.seeds import SeedResult
-from fabfold.solid.model import Solid
+from fabfold.solid.model import Paint, Solid
 from fabfold.store import StageStore
 from fabfold.tree.model import FoldTree
 from fabfold.tree.solve import Candidate
@@ -43,6 +43,11 @@ def save_solid(store: StageStore, solid: Solid) -> list[str]:
             "vertices": solid.vertices,
             "faces": solid.faces,
             "about": np.array([solid.name, solid.sha256, *solid.notes]),
+            **(
+                {}
+                if solid.paint is None
+                else {"paint": solid.paint.corners, "colours": solid.paint.colours}
+            ),
         },
     )
     return ["solid.npz"]
@@ -52,7 +57,8 @@ def load_solid(store: StageStore, files: list[str]) -> Solid:
     """Read what :func:`save_solid` wrote."""
     with np.load(store.path(files[0]), allow_pickle=False) as data:
         name, digest, *notes = (str(text) for text in data["about"])
-        return Solid(name, data["vertices"], data["faces"], tuple(notes), digest)
+        paint = Paint(data["paint"], data["colours"]) if "paint" in data.files else None
+        return Solid(name, data["vertices"], data["faces"], tuple(notes), digest, paint)
 
 
 def save_options(store: StageStore, options: list[Voxels]) -> list[str]:

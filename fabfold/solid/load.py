@@ -16,6 +16,7 @@ from fabfold.errors import ModelError
 from fabfold.files import sha256_of
 from fabfold.solid.convert import thinned, to_mesh
 from fabfold.solid.model import Solid
+from fabfold.solid.paint import painted_faces
 from fabfold.solid.pieces import one_piece
 from fabfold.solid.raw import RawMesh
 from fabfold.solid.surface import OpenSurfaceError, close_surface
@@ -146,6 +147,7 @@ def solid_from_mesh(name: str, raw: RawMesh, sha256: str = "", label: str = "") 
         faces=np.ascontiguousarray(faces, dtype=np.int32),
         notes=tuple(notes),
         sha256=sha256 or hashlib.sha256(raw.vertices.tobytes() + raw.faces.tobytes()).hexdigest(),
+        paint=painted_faces(raw.vertices, raw.faces, raw.colours),
     )
 
 

@@ -44,12 +44,15 @@ class RawMesh:
         What the reader had to assume.
     float32 : bool
         Whether the file stores coordinates in 32 bits.
+    colours : (f, 3) uint8 array or None
+        sRGB of each triangle, where the file has colours.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     notes: tuple[str, ...] = ()
     float32: bool = False
+    colours: NDArray[np.uint8] | None = None
 
 
 def no_faces(name: str, found: str = "") -> ModelError:

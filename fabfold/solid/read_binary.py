@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fabfold.errors import ModelError
+from fabfold.solid.paint import colours_of_mesh
 from fabfold.solid.raw import RawMesh, head_of, no_faces, what_is_it
 
 __all__ = ["read_3mf", "read_glb", "read_ply"]
@@ -42,6 +43,7 @@ def read_ply(path: Path) -> RawMesh:
         np.asarray(mesh.vertices, dtype=np.float64),
         np.asarray(mesh.faces, dtype=np.int64),
         float32=single,
+        colours=colours_of_mesh(mesh),
     )
 
 
@@ -113,6 +115,7 @@ def read_glb(path: Path) -> RawMesh:
         np.asarray(mesh.faces, dtype=np.int64),
         ("turned from the y-up of GLB files to z up",),
         float32=True,
+        colours=colours_of_mesh(mesh),
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fabfold.errors import ModelError
+from fabfold.solid.paint import colours_of_corners
 from fabfold.solid.polygon import triangulate_polygons
 from fabfold.solid.raw import RawMesh, head_of, is_text, no_faces, what_is_it
 
@@ -19,6 +20,8 @@ _AGAIN = "export the model again"
 def read_obj(path: Path) -> RawMesh:
     """Read the vertices and faces of a Wavefront OBJ file; materials, normals, UVs are skipped.
 
+    Colours are read where every vertex line has them, ``v x y z red green blue`` from 0 to 1.
+
     Raises
     ------
     ModelError
@@ -26,11 +29,14 @@ def read_obj(path: Path) -> RawMesh:
     """
     _refuse_binary(path, "an OBJ")
     vertices: list[tuple[float, ...]] = []
+    painted: list[tuple[float, ...]] = []
     polygons: list[list[int]] = []
     for number, line in _logical_lines(path):
         words = line.split()
         if words[0] == "v":
             vertices.append(_numbers(path, number, words[1:4]))
+            if len(words) == 7:
+                painted.append(_numbers(path, number, words[4:7]))
         elif words[0] == "f":
             corners = [word.split("/")[0] for word in words[1:]]
             indices = [_obj_index(path, number, corner, len(vertices)) for corner in corners]
@@ -47,7 +53,12 @@ def read_obj(path: Path) -> RawMesh:
     # An OBJ face may name a vertex that follows it, so positive indices are checked at the end.
     _check_range(path, polygons, len(vertices))
     corners_of = np.array(vertices, dtype=np.float64)
-    return RawMesh(corners_of, triangulate_polygons(corners_of, polygons))
+    faces = triangulate_polygons(corners_of, polygons)
+    colours = None
+    if len(painted) == len(vertices):
+        shades = np.rint(255 * np.clip(np.array(painted), 0.0, 1.0)).astype(int)
+        colours = colours_of_corners(faces, shades)
+    return RawMesh(corners_of, faces, colours=colours)
 
 
 def _obj_index(path: Path, number: int, corner: str, known: int) -> int:
