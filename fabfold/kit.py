@@ -132,6 +132,11 @@ class Kit:
             **options,
         )
 
+    @property
+    def template(self) -> Template:
+        """The target shape, as it is filled (before any folds of its own)."""
+        return self._template
+
     # Stages -----------------------------------------------------------------------------------
 
     def solid(self) -> Solid:
@@ -150,7 +155,7 @@ class Kit:
 
         return self._stage(
             "solid",
-            stage_key(__version__, self.recipe.model, self.recipe.sha256),
+            stage_key(__version__, self.recipe.model, self.recipe.sha256, "paint"),
             make,
             save_solid,
             load_solid,

@@ -152,24 +152,27 @@ def read_3mf(path: Path) -> RawMesh:
         )
     wrapper = lib3mf.get_wrapper()
     model = wrapper.CreateModel()
-    parts: list[tuple[Any, Any]] = []
+    parts: list[tuple[Any, Any, Any]] = []
     try:
         model.QueryReader("3mf").ReadFromFile(str(path))
         items = model.GetBuildItems()
         while items.MoveNext():
             item = items.GetCurrent()
             place = _affine(item.GetObjectTransform()) if item.HasObjectTransform() else np.eye(4)
-            _collect(item.GetObjectResource(), place, parts)
+            _collect(model, item.GetObjectResource(), place, parts)
     except lib3mf.ELib3MFException as error:
         raise ModelError(
             f"{path.name} cannot be read as 3MF ({str(error)[:160]}); export the model again"
         ) from error
     if not parts:
         raise no_faces(path.name)
-    offsets = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
+    offsets = np.cumsum([0] + [len(part[0]) for part in parts])
     faces = [part[1] + offset for part, offset in zip(parts, offsets, strict=False)]
     return RawMesh(
-        np.concatenate([vertices for vertices, _ in parts]), np.concatenate(faces), float32=True
+        np.concatenate([part[0] for part in parts]),
+        np.concatenate(faces),
+        float32=True,
+        colours=None if any(p[2] is None for p in parts) else np.concatenate([p[2] for p in parts]),
     )
 
 
@@ -179,7 +182,39 @@ def _affine(transform: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     return matrix
 
 
-def _collect(resource: Any, place: Any, parts: list[tuple[Any, Any]]) -> None:
+def _triangle_colours(model: Any, mesh: Any) -> Any:
+    """Colour of each triangle of a 3MF mesh, from colour groups or base materials; else None."""
+    import lib3mf
+
+    plain, index, whole = mesh.GetObjectLevelProperty()
+    entries = [
+        (entry.ResourceID, entry.PropertyIDs[0]) for entry in mesh.GetAllTriangleProperties()
+    ]
+    if not whole and not any(group for group, _ in entries):
+        return None
+    shades: dict[tuple[int, int], tuple[int, int, int]] = {}
+    out = []
+    for entry in entries:
+        # A triangle without a property of its own has the object's.
+        group, number = entry if entry[0] else (plain, index)
+        if (group, number) not in shades:
+            shade = (255, 255, 255)
+            try:
+                kind = model.GetPropertyTypeByID(group)
+                if kind == lib3mf.PropertyType.BaseMaterial:
+                    colour = model.GetBaseMaterialGroupByID(group).GetDisplayColor(number)
+                    shade = (colour.Red, colour.Green, colour.Blue)
+                elif kind == lib3mf.PropertyType.Colors:
+                    colour = model.GetColorGroupByID(group).GetColor(number)
+                    shade = (colour.Red, colour.Green, colour.Blue)
+            except lib3mf.ELib3MFException:
+                pass  # no such property: as good as none
+            shades[group, number] = shade
+        out.append(shades[group, number])
+    return np.array(out, dtype=np.uint8).reshape(-1, 3)
+
+
+def _collect(model: Any, resource: Any, place: Any, parts: list[tuple[Any, Any, Any]]) -> None:
     """Append the placed meshes of a 3MF object and of its components to `parts`."""
     if resource.IsMeshObject():
         if not resource.GetTriangleCount():
@@ -188,9 +223,10 @@ def _collect(resource: Any, place: Any, parts: list[tuple[Any, Any]]) -> None:
         faces = np.array([list(t.Indices) for t in resource.GetTriangleIndices()], dtype=np.int64)
         if np.linalg.det(place[:3, :3]) < 0:
             faces = faces[:, ::-1]
-        parts.append((vertices @ place[:3, :3].T + place[:3, 3], faces))
+        moved = vertices @ place[:3, :3].T + place[:3, 3]
+        parts.append((moved, faces, _triangle_colours(model, resource)))
     elif resource.IsComponentsObject():
         for index in range(resource.GetComponentCount()):
             component = resource.GetComponent(index)
             own = _affine(component.GetTransform()) if component.HasTransform() else np.eye(4)
-            _collect(component.GetObjectResource(), place @ own, parts)
+            _collect(model, component.GetObjectResource(), place @ own, parts)
