@@ -239,7 +239,7 @@ def main() -> None:
                     row["tree"] = measured(["--stage", "tree", str(side), *common], limit)
                 data["rows"].append(row)
                 print(json.dumps(row), flush=True)
-        kept.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+                kept.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     (HERE / "growth.md").write_text(table(data), encoding="utf-8")
     print(table(data))
 

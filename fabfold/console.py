@@ -113,6 +113,13 @@ def show_result(kit: Kit, stage: str) -> None:
 def _result_lines(kit: Kit, stage: str) -> list[str]:
     lines = [f"note: {note}" for note in kit.solid().notes]
     if stage == "voxelize":
+        template = kit.template
+        even, odd = template.colours
+        lines.append(
+            f"template {template.name}: {len(template)} cells in "
+            f"{' x '.join(map(str, template.shape))}, {even} + {odd} by checkerboard colour"
+            + (f", {len(template.creases)} more folds" if template.creases else "")
+        )
         for index, voxels in enumerate(kit.voxelize()):
             lines.append(
                 f"voxelization {index}: {len(voxels)} voxels, {voxels.fill.mean():.0%} full, "
