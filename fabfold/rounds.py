@@ -14,7 +14,7 @@ from fabfold.fold.foldability import LatticeFoldability
 from fabfold.lattice import Template
 from fabfold.progress import Progress
 from fabfold.recipe import Recipe
-from fabfold.search import Budget, Tally, best_first, executor, run_seeds, search
+from fabfold.search import Budget, Tally, best_first, executor, run_seeds, search, warm_up
 from fabfold.seeds import Event, Job, SeedResult
 from fabfold.shelf import Shelf
 from fabfold.store import StageStore, stage_key
@@ -274,6 +274,9 @@ class Rounds:
                 def hear(event: Event) -> None:
                     tally.hear(self._shelf.keep(event, keys[event.seed], seconds))
 
+                progress.update(None, "getting ready")
+                warm_up(pool)
+                budget.restart()
                 run_seeds(pool, tasks(), hear, budget.over)
         tally.check_failures()
         return tally.results
@@ -314,6 +317,7 @@ class Rounds:
             weights_of(self.recipe),
             bias=self.wishes.bias(voxels, self.template),
             stiff=uncut_pairs(uncut, joints),
+            joints=self.recipe.joints,
         )
         problem = self.wishes.apply(problem, voxels, self.template)
         if self.template.creases:

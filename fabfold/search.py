@@ -12,16 +12,30 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
 
 from fabfold.errors import NoTreeError, RecipeError, WorkerError
+from fabfold.fold.foldability import LatticeFoldability
+from fabfold.lattice import load_template
 from fabfold.progress import Progress, SilentProgress
 from fabfold.seeds import Better, Done, Event, Executor, Job, SeedResult
-from fabfold.tree.effort import Effort
+from fabfold.tree.effort import EFFORTS, Effort
 from fabfold.tree.foldability import Foldability
-from fabfold.tree.problem import TreeProblem
+from fabfold.tree.problem import TreeProblem, tree_problem
 from fabfold.tree.solve import Candidate
 
-__all__ = ["Budget", "SeedResult", "Tally", "best_first", "executor", "run_seeds", "search"]
+__all__ = [
+    "Budget",
+    "SeedResult",
+    "Tally",
+    "best_first",
+    "executor",
+    "run_seeds",
+    "search",
+    "warm_up",
+]
 
 #: Workers that a seed may take down before it is left out.
 TRIES = 3
@@ -56,6 +70,10 @@ class Budget:
     def over(self) -> bool:
         """Whether it is used up."""
         return self.share >= 1.0
+
+    def restart(self) -> None:
+        """Count from now on."""
+        self._start = time.monotonic()
 
 
 @contextmanager
@@ -167,6 +185,26 @@ def run_seeds(
     for seed in [*running, *(seed for seed, _ in again)]:
         found = (best[seed],) if seed in best else ()
         hear(Done(seed, SeedResult(found, why="no time left", cut=0.0)))
+
+
+def warm_up(pool: Executor) -> None:
+    """Have each worker load the compiled kernels, so that a budget is spent on the search.
+
+    After an installation that takes a minute, for they are compiled first; later a second.
+    """
+    cells = np.array([(i, 0, 0) for i in range(8)], np.int32)
+    count = len(cells) - 1
+    problem = tree_problem(
+        cells,
+        load_template("box-2x2x2"),
+        pairs=np.array([(i, i + 1) for i in range(count)], np.int32),
+        rigid=np.ones(count, np.bool_),
+        hinge=np.ones((count, 4), np.bool_),
+        depth=np.zeros((len(cells), 6)),
+    )
+    job = Job(problem, LatticeFoldability(), replace(EFFORTS["quick"], restarts=2, polishing=20))
+    forever = Budget()
+    run_seeds(pool, [(seed, job) for seed in range(pool.free())], lambda _event: None, forever.over)
 
 
 class Tally:

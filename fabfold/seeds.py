@@ -140,7 +140,7 @@ def run_seed(
     except NoFoldError as error:
         why = str(error)
     except NoTreeError as error:
-        fits, why = False, str(error)
+        fits, why = heard, str(error)  # With more time one might have fitted.
     except Exception:
         # One seed that trips over a mistake must not take the others' results with it.
         why, failed = f"seed {seed} failed:\n{traceback.format_exc()}", True

@@ -100,7 +100,13 @@ def _scale(voxels: int) -> _Scale:
 
 
 def grow(
-    problem: TreeProblem, seed: int, *, beam: int = 10, roots: int = 400, repairs: int = 2000
+    problem: TreeProblem,
+    seed: int,
+    *,
+    beam: int = 10,
+    roots: int = 400,
+    repairs: int = 2000,
+    stop: Callable[[], bool] | None = None,
 ) -> Iterator[NDArray[np.int32]]:
     """Full sets of poses grown from random root poses.
 
@@ -117,6 +123,8 @@ def grow(
         Root poses tried.
     repairs : int
         Removals tried to complete a set of poses.
+    stop : callable, optional
+        Polled before each root pose; once it returns True no more are tried.
 
     Yields
     ------
@@ -136,6 +144,8 @@ def grow(
     count = len(problem)
     out = np.empty((beam, count), np.int32)
     for _ in range(roots):
+        if stop is not None and stop():
+            return
         root = int(rng.integers(count))
         wanted = cells[(colour[root] + colourings[int(rng.integers(len(colourings)))]) % 2]
         start = np.full(count, -1, np.int32)
@@ -218,7 +228,7 @@ class _Search:
         value, _ = energy_of(self.tables, pose, self.problem.empty_face)
         value += loose * left
         last = self.statistics.removals + self.effort.removals
-        while left > 0 and self.statistics.removals < last:
+        while left > 0 and self.statistics.removals < last and not self.stopped():
             found = self.neighbour(pose, value + 0.3 * self.rng.exponential(), 100, loose)
             if found is not None:
                 pose, value, left = found
@@ -362,7 +372,9 @@ class _Search:
     def run(self) -> list[Candidate]:
         """All the phases."""
         effort = self.effort
-        grown = grow(self.problem, self.seed, beam=effort.beam, roots=effort.roots)
+        grown = grow(
+            self.problem, self.seed, beam=effort.beam, roots=effort.roots, stop=self.stopped
+        )
         for pose in grown:
             self.statistics.grown += 1
             start = self.hang_together(pose)
