@@ -138,6 +138,14 @@ Protect = Annotated[
         "'painted(#rrggbb)' for faces in another colour. Repeatable.",
     ),
 ]
+Joints = Annotated[
+    str | None,
+    typer.Option(
+        "--joints",
+        help="Hinges to search with: S (single, the default), S+D (double ones too), S90 or all "
+        "(quarter turns too).",
+    ),
+]
 JointsInside = Annotated[
     bool | None,
     typer.Option(
@@ -267,6 +275,7 @@ def _stage(name: str, summary: str) -> None:
         keep: Keep = None,
         keep_weight: KeepWeight = None,
         protect: Protect = None,
+        joints: Joints = None,
         joints_inside: JointsInside = None,
         pick: Pick = None,
         workers: Workers = None,

@@ -20,6 +20,7 @@ from fabfold import __version__
 from fabfold.errors import FabfoldError, RecipeError
 from fabfold.lattice import load_template
 from fabfold.targets import is_file_name
+from fabfold.tree.catalogue import JointSet
 
 __all__ = ["Recipe", "read_recipe"]
 
@@ -92,6 +93,10 @@ class Recipe(BaseModel):
     protect: Annotated[
         tuple[str, ...], Field(description="regions of the model that no cut may cross")
     ] = ()
+    joints: Annotated[
+        JointSet,
+        Field(description="hinges: S single, S+D double ones too, S90 and all: quarter turns too"),
+    ] = "S"
     joints_inside: Annotated[
         bool, Field(description="no hinge on the visible faces of the box")
     ] = False

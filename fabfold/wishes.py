@@ -65,10 +65,11 @@ def wished(recipe: Recipe) -> list[Any]:
         "keep": list(recipe.keep),
         "keep_weight": recipe.keep_weight if recipe.keep else 0.0,
         "protect": list(recipe.protect),
+        "joints": recipe.joints,
         "joints_inside": recipe.joints_inside,
         "void": recipe.void,
         "prefer": recipe.prefer,
     }
     idle = {"keep": [], "keep_weight": 0.0, "protect": [], "joints_inside": False, "void": 0.0}
-    usual = {**idle, "prefer": 0.5}
+    usual = {**idle, "prefer": 0.5, "joints": "S"}
     return [[name, value] for name, value in fields.items() if value != usual[name]]
