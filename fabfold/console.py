@@ -48,11 +48,13 @@ class ConsoleListener:
         if not self._console.is_terminal:
             plain = _LastMessage()
             start = time.monotonic()
-            yield plain
-            seconds = time.monotonic() - start
-            self._console.print(
-                f"{title:32} {seconds:6.1f} s  {plain.message}", highlight=False, soft_wrap=True
-            )
+            try:
+                yield plain
+            finally:  # What was reached is worth telling, also where the stage is stopped.
+                seconds = time.monotonic() - start
+                self._console.print(
+                    f"{title:32} {seconds:6.1f} s  {plain.message}", highlight=False, soft_wrap=True
+                )
         elif self._bars is not None:
             with _bar(self._bars, title) as bar:
                 yield bar
@@ -126,13 +128,15 @@ def _result_lines(kit: Kit, stage: str) -> list[str]:
                 f"smallest {voxels.fill.min():.0%}, {voxels.lost_volume:.1%} of the volume lost"
             )
         return lines
-    attempt = kit.fold() if stage in ("fit", "fold") else kit.join().attempt
+    made = None if stage in ("fit", "fold") else kit.join()
+    attempt = kit.fold() if made is None else made.attempt
     tree, motion = attempt.tree, attempt.motion
+    joinery = None if made is None else made.joinery
     lines.append(
         f"{len(tree.source)} voxels in {len(tree.bodies)} bodies, {len(tree.hinges)} hinges, "
         f"folding into {tree.template.name} in {len(motion.moves) - 1} moves"
     )
-    lines += [str(entry["text"]) for entry in kit.granted(attempt)]
+    lines += [str(entry["text"]) for entry in kit.granted(attempt, joinery)]
     if motion.certificate:
         lines.append(f"smallest gap on the whole path {motion.certificate['min_gap_mm']:.3f} mm")
     if stage in ("check", "export"):
