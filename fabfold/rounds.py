@@ -253,6 +253,7 @@ class Rounds:
             known |= held
 
         def tasks() -> Iterator[tuple[int, Job]]:
+            given = bool(known)
             for number in range(rounds):
                 tally.check_failures()
                 keys.update(self._keys(number))
@@ -261,7 +262,14 @@ class Rounds:
                     cut = known[seed].cut if seed in known else 0.0
                     # With no more time than it had before, a seed would not come further.
                     if cut is not None and cut < seconds:
-                        job = job or self._job(number)
+                        try:
+                            job = job or self._job(number)
+                        except NoTreeError:
+                            # Another voxelization may do; where none does, the first says why.
+                            if number + 1 >= len(self.options) and not given:
+                                raise
+                            break
+                        given = True
                         yield seed, job
 
         if seconds <= 0:
