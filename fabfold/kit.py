@@ -34,6 +34,7 @@ from fabfold.store import StageStore, stage_key
 from fabfold.targets import find_input, is_file_name, load_target, named_target
 
 if TYPE_CHECKING:
+    from fabfold.joinery.model import Joinery
     from fabfold.pareto import Solution
     from fabfold.printing.checks import Check
     from fabfold.printing.profiles import Profile
@@ -286,7 +287,7 @@ class Kit:
         with self.listener.stage("export") as progress:
             write_kit(
                 target, self.recipe, profile, self.solid(), made, checks, progress,
-                self.granted(made.attempt),
+                self.granted(made.attempt, made.joinery),
             )  # fmt: skip
         if target != self.folder:
             if self._model is not None:
@@ -309,7 +310,7 @@ class Kit:
         made = self.join()
         writing.write_made(self.folder, made)
         if stage == "check":
-            granted = self.granted(made.attempt)
+            granted = self.granted(made.attempt, made.joinery)
             writing.write_checks(self.folder, self.solid(), made, result, granted)
 
     # How the stages hang together ---------------------------------------------------------------
@@ -395,9 +396,21 @@ class Kit:
         result: Wishes = self._results["wishes"]
         return result
 
-    def granted(self, attempt: Attempt) -> list[dict[str, Any]]:
-        """What became of each wish in a tree, with figures and a line of text."""
-        return self.wishes().report(attempt.voxels, attempt.tree)
+    def granted(self, attempt: Attempt, joinery: Joinery | None = None) -> list[dict[str, Any]]:
+        """What became of each wish in a tree, and in its bodies, with figures and a line of text."""
+        from fabfold.wishes import printed_share
+
+        wishes = self.wishes()
+        found = wishes.report(attempt.voxels, attempt.tree)
+        if joinery is not None:
+            entries = {entry["wish"]: entry for entry in found}
+            for region in wishes.regions:
+                points = np.concatenate(region.pieces)
+                share = printed_share(points, attempt.voxels, joinery)
+                entry = entries[f"protect {region.text}"]
+                entry["printed"] = round(share, 4)
+                entry["text"] += f"; grooves and gaps leave {share:.1%} of it"
+        return found
 
     def pareto(self) -> list[Solution]:
         """Trees that fold of which none is better than another in every respect.

@@ -4,14 +4,26 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fabfold.errors import RecipeError
+from fabfold.joinery.model import Joinery
 from fabfold.recipe import Recipe
 from fabfold.solid.model import Solid
 from fabfold.tree.problem import Weights
 from fabfold.tree.wishes import Keep, Wishes
-from fabfold.voxels.regions import area_of, parse_keep, parse_shape, region_of
+from fabfold.voxels.model import Voxels
+from fabfold.voxels.regions import (
+    area_of,
+    owners,
+    parse_keep,
+    parse_shape,
+    region_of,
+    to_lattice,
+)
 
-__all__ = ["make_wishes", "weights_of", "wished"]
+__all__ = ["make_wishes", "printed_share", "weights_of", "wished"]
 
 #: How far the knob between hinges and surface reaches: at its ends one weight is this many times
 #: greater, and the other as many times smaller.
@@ -57,6 +69,36 @@ def make_wishes(recipe: Recipe, solid: Solid) -> Wishes:
         regions=tuple(regions),
         void=recipe.void,
     )
+
+
+def printed_share(points: NDArray[np.float64], voxels: Voxels, joinery: Joinery) -> float:
+    """Share of points of the model (k, 3) that lie in printed material.
+
+    Hinge barrels that pass by on the folding path need grooves, and bodies stand apart by a gap:
+    both can take a little even of a protected region.
+    """
+    from fabfold.voxels.scan import occupancy
+
+    holder = owners(voxels, points)
+    held = points[holder >= 0]
+    if not len(held):
+        return 0.0
+    at = np.array(joinery.origin_mm) + joinery.voxel_mm * to_lattice(voxels, held)
+    step = joinery.voxel_mm / 80
+    low = at.min(axis=0) - step
+    size = np.ceil((at.max(axis=0) - low) / step).astype(int) + 1
+    step *= max(1.0, float(np.cbrt(np.prod(size.astype(float)) / 20_000_000)))
+    x, y, z = (np.ceil((at.max(axis=0) - low) / step).astype(int) + 1).tolist()
+    index = tuple(np.floor((at - low) / step).astype(int).T)
+    inside = np.zeros(len(at), dtype=bool)
+    for body in joinery.bodies:
+        apart = (body.vertices.min(axis=0) > at.max(axis=0)) | (
+            body.vertices.max(axis=0) < at.min(axis=0)
+        )
+        if not apart.any():
+            grid = occupancy((body.vertices - low) / step, body.faces, (x, y, z))
+            inside |= np.asarray(grid)[index]
+    return float(inside.mean())
 
 
 def wished(recipe: Recipe) -> list[Any]:
