@@ -5,13 +5,14 @@ Nothing here is shared with the search but the data classes and ``FoldTree.body_
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.tree.model import FoldTree
+from fabfold.tree.model import FoldTree, Hinge
 
 __all__ = ["check_tree"]
 
@@ -22,8 +23,10 @@ def check_tree(tree: FoldTree) -> list[str]:
     Checked: distinct cells in A and in B; target cells in the template; the edges span the
     voxels and join face neighbours; bodies are exactly the voxels that R edges join; hinges in
     order, on the lattice edge of the face that their voxels share; turns of 90, 180 or 270
-    degrees; forward kinematics carries every voxel to its target and orientation; no two hinges
-    on one lattice edge segment in A or in B.
+    degrees that open the face; a double hinge joins parent, link plate and child in this order,
+    on two edges; no voxel has two double hinges; forward kinematics carries every voxel to its
+    target and orientation; no two hinges on one lattice edge segment and no two link plates on one
+    lattice face in A or in B.
 
     Parameters
     ----------
@@ -43,7 +46,7 @@ def check_tree(tree: FoldTree) -> list[str]:
     found = _bodies(tree) + _hinges(tree)
     if found:
         return found
-    return _kinematics(tree) + _segments(tree)
+    return _kinematics(tree) + _senses(tree) + _segments(tree) + _plates(tree)
 
 
 def _shapes(tree: FoldTree) -> list[str]:
@@ -126,6 +129,10 @@ def _bodies(tree: FoldTree) -> list[str]:
             0 <= body.edge < len(tree.edges) and tree.edges[body.edge].kind == "D"
         ):
             found.append(f"{body.name}: a link has no voxels and belongs to a D edge")
+    links = Counter(body.edge for body in tree.bodies if body.edge is not None)
+    wanted = Counter(number for number, edge in enumerate(tree.edges) if edge.kind == "D")
+    if links != wanted:
+        found.append("the links are not one for each D edge")
     names = [body.name for body in tree.bodies] + [hinge.name for hinge in tree.hinges]
     if len(set(names)) != len(names):
         found.append("names of bodies and hinges are not unique")
@@ -154,6 +161,7 @@ def _hinges(tree: FoldTree) -> list[str]:
         joined = {hinge.parent for hinge in chain} | {hinge.child for hinge in chain}
         if not set(ends) <= joined:
             found.append(f"edge {number}: its hinges do not join the bodies of its voxels")
+        found += _chain(tree, number, chain)
         p, c = tree.source[edge.parent], tree.source[edge.child]
         for hinge in chain:
             offset = np.array(hinge.point) - (p + c) / 2.0
@@ -172,6 +180,53 @@ def _hinges(tree: FoldTree) -> list[str]:
                     f"{hinge.name}: its axis is on no edge of the face between voxels "
                     f"{edge.parent} and {edge.child}"
                 )
+    return found
+
+
+def _chain(tree: FoldTree, number: int, chain: list[Hinge]) -> list[str]:
+    """Order and lattice edges of the hinges of one edge."""
+    edge = tree.edges[number]
+    owner = tree.voxel_body
+    bodies = [int(owner[edge.parent]), int(owner[edge.child])]
+    if edge.kind == "D":
+        link = next(i for i, body in enumerate(tree.bodies) if body.edge == number)
+        bodies.insert(1, link)
+    found = []
+    if [(h.parent, h.child) for h in chain] != list(itertools.pairwise(bodies)):
+        found.append(f"edge {number}: its hinges do not join parent, link and child in this order")
+    if len({hinge.point for hinge in chain}) != len(chain):
+        found.append(f"edge {number}: both axes of a double hinge lie on one edge")
+    return found
+
+
+def _senses(tree: FoldTree) -> list[str]:
+    found = []
+    for edge in tree.edges:
+        p, c = tree.source[edge.parent], tree.source[edge.child]
+        for hinge in (tree.hinges[h] for h in edge.hinges):
+            out = np.array(hinge.point) - (p + c) / 2.0
+            opening = np.cross((c - p).astype(float), out) @ np.array(hinge.direction)
+            if opening * hinge.angle_deg < 0:
+                found.append(f"{hinge.name}: its turn of {hinge.angle_deg:g}° runs into the face")
+    return found
+
+
+def _plates(tree: FoldTree) -> list[str]:
+    found = []
+    doubles = [edge for edge in tree.edges if edge.kind == "D"]
+    held = Counter(voxel for edge in doubles for voxel in (edge.parent, edge.child))
+    found += [f"voxel {voxel} has {n} double hinges" for voxel, n in held.items() if n > 1]
+    poses = tree.body_poses(tree.fold_angles)
+    seen: dict[tuple[int, ...], str] = {}
+    for body, pose in zip(tree.bodies, poses, strict=True):
+        if body.edge is None:
+            continue
+        edge = tree.edges[body.edge]
+        middle = (tree.source[edge.parent] + tree.source[edge.child]) / 2.0
+        key = tuple(np.rint(2 * (pose[:3, :3] @ middle + pose[:3, 3])).astype(int).tolist())
+        if key in seen:
+            found.append(f"{seen[key]} and {body.name} lie on one lattice face in B")
+        seen[key] = body.name
     return found
 
 

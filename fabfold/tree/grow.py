@@ -14,6 +14,11 @@ from fabfold.tree.rng import mix, random_float
 __all__ = ["clusters", "doubles_needed", "energy_of", "fill_beam"]
 
 
+#: Price of a double hinge while growing. A voxel can hold one only, so where they are taken freely
+#: too many pieces are left that no hinge can join.
+SCARCE = 0.1
+
+
 @njit(cache=True)
 def clusters(tables: Tables, pose: NDArray[np.int32], label: NDArray[np.int32]) -> int:
     """Label the rigid clusters of the placed voxels; -1 for voxels that are not placed.
@@ -284,6 +289,7 @@ def fill_beam(
     count = len(start)
     room = len(tables.cells)
     joints = tables.step.shape[1]
+    doubles = joints > tables.single + 1
     whole = len(tables.stiff) > 0
     pose = np.empty((2, width, count), np.int32)
     label = np.empty((2, width, count), np.int32)
@@ -329,12 +335,14 @@ def fill_beam(
             expansions += 1
             here = pose[now, b]
             stamp[0] += 1
-            for f in range(6):
-                u = tables.neighbour[v, f]
+            # Single hinges first: what they reach wants no double one.
+            for f in range(12 if doubles else 6):
+                u = tables.neighbour[v, f % 6]
                 if u < 0 or here[u] < 0:
                     continue
-                g = f ^ 1
-                for j in range(joints):
+                g = (f % 6) ^ 1
+                first = 0 if f < 6 else tables.single + 1
+                for j in range(first, joints if f >= 6 else tables.single + 1):
                     if not tables.allowed[u, g, j]:
                         continue
                     q = tables.step[g, j, here[u]]
@@ -343,10 +351,14 @@ def fill_beam(
                     mark[q] = stamp[0]
                     if whole and not keeps_whole(tables, here, v, q):
                         continue
-                    merged = _merged(tables, here, label[now, b], v, q, joined)
+                    merged = 0
+                    if f < 6:
+                        merged = _merged(tables, here, label[now, b], v, q, joined)
                     delta = np.float64(tables.cost[v, q])
                     delta -= np.float64(tables.centre[v, q // 24])
                     delta += joint_share * tables.weight[1] * (1 - merged)
+                    if f >= 6:
+                        delta += SCARCE
                     from_state[options] = b
                     to_pose[options] = q
                     plain[options] = score[now, b] + delta

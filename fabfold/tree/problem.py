@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -142,6 +143,19 @@ class TreeProblem:
     def empty_face(self) -> float:
         """Weighted surface energy of one boundary face of an empty template cell."""
         return self.weights.surface
+
+    @cached_property
+    def single_tables(self) -> Tables:
+        """The tables without double hinges."""
+        tables, last = self.tables, self.tables.single + 1
+        if last == len(self.joints):
+            return tables
+        return tables._replace(
+            allowed=np.ascontiguousarray(tables.allowed[:, :, :last]),
+            step=np.ascontiguousarray(tables.step[:, :last]),
+            weight=tables.weight[:last].copy(),
+            way_start=np.ascontiguousarray(tables.way_start[:, : last + 1]),
+        )
 
     @property
     def keeps_colour(self) -> bool:

@@ -143,9 +143,12 @@ def grow(
     cells = [np.flatnonzero(parity(problem.template.cells) == c) for c in (0, 1)]
     count = len(problem)
     out = np.empty((beam, count), np.int32)
-    for _ in range(roots):
+    for number in range(roots):
         if stop is not None and stop():
             return
+        # Double hinges grown freely leave pieces that no tree joins; they come in later. Every
+        # fourth time they may help to fill the template.
+        tables = problem.tables if number % 4 == 3 else problem.single_tables
         root = int(rng.integers(count))
         wanted = cells[(colour[root] + colourings[int(rng.integers(len(colourings)))]) % 2]
         start = np.full(count, -1, np.int32)
@@ -156,9 +159,9 @@ def grow(
             start[root] = first
         todo = np.flatnonzero(start < 0).astype(np.int32)
         if len(todo):
-            fill_beam(problem.tables, start, todo, beam, 0.3, 0.5, True, state, out)
+            fill_beam(tables, start, todo, beam, 0.3, 0.5, True, state, out)
             start = out[0].copy()
-        left, _ = repair(problem.tables, start, repairs, 20, 12, state)
+        left, _ = repair(tables, start, repairs, 20, 12, state)
         if left == 0:
             yield start
 
