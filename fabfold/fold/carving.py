@@ -34,7 +34,7 @@ F64 = NDArray[np.float64]
 
 #: Side of a hinge's bracket across the axis and how far it stays from the ends of the lattice
 #: edge, in voxel sides, with a little to spare: 4 of 20 mm and 2.8 of 20 mm.
-BRACKET = (0.22, 0.12)
+BRACKET = (0.235, 0.12)
 #: What a subvoxel of the model's surface, of a cell's core, and of a hinge costs; 1 elsewhere.
 SKIN_COST, CORE_COST, HINGE_COST = 3.0, 2.0, 1e6
 #: Subvoxels that count as surface, counted from the outside.

@@ -208,7 +208,8 @@ class _Bench:
             np.rint(2.0 * (to[:, :3] @ self.tree.source[v] + to[:, 3] / self.voxel_mm)) / 2.0 - 0.5
             for to, v in zip(frames, voxels, strict=True)
         ]
-        rings = _common_rings(corners[0], corners[1]) * self.voxel_mm
+        rings = _common_rings(corners[0], corners[1], self._reach / self.voxel_mm)
+        rings = rings * self.voxel_mm
         level = (corners[0][2] + np.arange(_SLABS + 1) / _SLABS) * self.voxel_mm
         inner, outer = low * self.voxel_mm, high * self.voxel_mm
         sides = [_slabs(self._parts(v), to, level) for to, v in zip(frames, voxels, strict=True)]
@@ -253,8 +254,12 @@ class _Bench:
         tool = _worked_out(tool.transform(_inverse(frame)) ^ self._box(voxel, 2 * self._reach))
         cell = self._cell(voxel)
         body = int(self.body[voxel])
-        hit = (cell ^ tool).volume() > _TOUCH_MM3
+        hit = False
         for half, _ in self.halves[body]:
+            if (half ^ tool).volume() <= _TOUCH_MM3:
+                continue
+            # What stands out of the cell is the barrel; the other body has a groove for it.
+            tool = _worked_out(tool - (half - self._box(voxel, 0.0)))
             lost = (half ^ tool).volume()
             hit = hit or lost > _TOUCH_MM3
             if lost > _GRAZE * half.volume():
@@ -262,6 +267,7 @@ class _Bench:
                     f"{self.tree.bodies[body].name}: carving would take {lost:.1f} mm³ of one of "
                     "its hinges"
                 )
+        hit = hit or (cell ^ tool).volume() > _TOUCH_MM3
         if not hit:
             return
         out.tools.setdefault(body, []).append(tool)
@@ -319,10 +325,13 @@ def _inverse(frame: Floats) -> Floats:
     return back
 
 
-def _common_rings(first: Floats, second: Floats) -> Floats:
-    """Radii, lattice units, that divide the rings in which both unit squares have a part."""
-    low = max(np.hypot(*first[:2]), np.hypot(*second[:2]))
-    high = min(np.hypot(*(first[:2] + 1)), np.hypot(*(second[:2] + 1)))
+def _common_rings(first: Floats, second: Floats, beyond: float) -> Floats:
+    """Radii, lattice units, that divide the rings in which both unit squares have a part.
+
+    And a little beyond: what turns just inside of such a ring comes too near.
+    """
+    low = max(0.0, np.hypot(*first[:2]) - beyond, np.hypot(*second[:2]) - beyond)
+    high = min(np.hypot(*(first[:2] + 1)), np.hypot(*(second[:2] + 1))) + beyond
     return np.linspace(low, high, max(2, int(np.ceil((high - low) * _RINGS))) + 1)
 
 
