@@ -195,11 +195,12 @@ def show_list(what: str) -> None:
             table.add_row(f"sample:{known.name}", known.template, known.title)
     elif what == "templates":
         from fabfold.lattice import load_template, template_names
+        from fabfold.templates import describe
 
-        table = Table("template", "cells", box=None)
-        table.add_row("box-AxBxC", "any size: A × B × C")
+        table = Table("template", "cells", "what it is", box=None)
+        table.add_row("box-AxBxC", "A × B × C", "a box of any size")
         for name in template_names():
-            table.add_row(name, str(len(load_template(name))))
+            table.add_row(name, str(len(load_template(name))), describe(name))
     elif what == "profiles":
         from fabfold.printing.profiles import load_profile, profile_names
 

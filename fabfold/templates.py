@@ -25,9 +25,17 @@ import numpy as np
 
 from fabfold.creases import check_creases
 from fabfold.errors import TemplateError
-from fabfold.lattice import FACES, MAX_CELLS, MAX_SIDE, Crease, IntArray, Template
+from fabfold.lattice import (
+    FACES,
+    MAX_CELLS,
+    MAX_SIDE,
+    Crease,
+    IntArray,
+    Template,
+    templates_folder,
+)
 
-__all__ = ["pieces_of", "read_template"]
+__all__ = ["describe", "pieces_of", "read_template"]
 
 _KEYS = {"name", "description", "cells", "layers", "box", "remove", "fold", "joints"}
 
@@ -59,6 +67,12 @@ def read_template(path: Path) -> Template:
     except ValueError as error:
         raise TemplateError(f"template file {path}: {error}") from None
     return template
+
+
+def describe(name: str) -> str:
+    """What a shipped template says of itself."""
+    text = (templates_folder() / f"{name}.toml").read_text(encoding="utf-8")
+    return str(tomllib.loads(text).get("description", ""))
 
 
 def _template(data: dict[str, Any], stem: str) -> Template:
