@@ -397,7 +397,7 @@ class Kit:
         return result
 
     def granted(self, attempt: Attempt, joinery: Joinery | None = None) -> list[dict[str, Any]]:
-        """What became of each wish in a tree, and in its bodies, with figures and a line of text."""
+        """What became of each wish in a tree and its bodies: figures and a line of text."""
         from fabfold.wishes import printed_share
 
         wishes = self.wishes()

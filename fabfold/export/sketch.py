@@ -44,7 +44,7 @@ def picture_of_tree(voxels: Voxels, tree: FoldTree, view: View | None = None) ->
     voxels : Voxels
     tree : FoldTree
     view : View, optional
-        See :func:`fabfold.export.picture.strip`.
+        A small, quick one by default. See :func:`fabfold.export.picture.strip`.
 
     Returns
     -------
@@ -55,6 +55,6 @@ def picture_of_tree(voxels: Voxels, tree: FoldTree, view: View | None = None) ->
     angles = np.stack([np.zeros(len(tree.hinges)), tree.fold_angles])
     names = tuple(hinge.name for hinge in tree.hinges)
     motion = Motion(names, angles, ((), tuple(range(len(names)))))
-    return strip(
-        joinery, tree, motion, view, colours=colours, upright=voxels.rotation.T, between=False
-    )
+    view = view or View(size=(420, 420), lights=16)
+    upright = voxels.rotation.T
+    return strip(joinery, tree, motion, view, colours=colours, upright=upright, between=False)
