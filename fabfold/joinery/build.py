@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -241,9 +242,10 @@ def _body(
             tally.carved_cells += _count_cells(cut, lost, cells, names)
     halves = [less(cut.half(half, grooves, pockets), rounds) for half in halves]
 
+    @cache
     def free() -> manifold3d.Manifold:
         shut = [*rounds, *rounded.shut.get(cut.index, [])]
-        return less(room, [*carves, *shut, *(tool for _, tool in (*grooves, *pockets))])
+        return less(room, [*carves, *shut, *meeting([*grooves, *pockets], room)])
 
     return one_piece(cut.name, cells, free, material, halves, voxel_mm, tally)
 

@@ -282,24 +282,26 @@ def _segment_distance(placements: Floats, low: Floats, high: Floats) -> Floats:
     return np.asarray(nearest - 0.5 / (len(samples) - 1), dtype=float)
 
 
-def _rod(ends: Floats, radius: float, trim: float) -> Floats:
-    """Points whose hull is a rod about the segment `ends` (mm), shortened by `trim` at each end.
+def _rods(ends: Floats, radius: float, trim: float) -> Floats:
+    """Points whose hulls are rods about segments (a, 2, 3) in mm, shortened by `trim` at each end.
 
-    The polygon is drawn about the circle, so the rod contains the round one.
+    The polygon is drawn about the circle, so a rod contains the round one.
+
+    Returns
+    -------
+    (a, 2 * _SIDES, 3) float64 array
     """
-    axis = ends[1] - ends[0]
-    axis = axis / np.linalg.norm(axis)
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    axis = ends[:, 1] - ends[:, 0]
+    axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    helper = np.eye(3)[np.abs(axis).argmin(axis=1)]
     across = np.cross(axis, helper)
-    across /= np.linalg.norm(across)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
     upright = np.cross(axis, across)
     angles = 2 * np.pi * np.arange(_SIDES) / _SIDES
-    ring = (
-        radius
-        / np.cos(np.pi / _SIDES)
-        * (np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * upright)
-    )
-    return np.concatenate([ends[0] + trim * axis + ring, ends[1] - trim * axis + ring])
+    ring = np.cos(angles)[:, None] * across[:, None] + np.sin(angles)[:, None] * upright[:, None]
+    ring *= radius / np.cos(np.pi / _SIDES)
+    start, end = ends[:, 0] + trim * axis, ends[:, 1] - trim * axis
+    return np.concatenate([start[:, None] + ring, end[:, None] + ring], axis=1)
 
 
 def groove_tools(
@@ -337,7 +339,7 @@ def groove_tools(
     for passage in found:
         if passage.angle_deg == 0.0:
             if _segment_distance(passage.start[None], low, high)[0] < reach:
-                rod = _rod(passage.start * voxel_mm, radius_mm, trim_mm)
+                (rod,) = _rods(passage.start[None] * voxel_mm, radius_mm, trim_mm)
                 tools.append((passage.hinge, manifold3d.Manifold.hull_points(rod)))
             continue
         arm = _arm(passage)
@@ -349,12 +351,10 @@ def groove_tools(
         slack = arm * np.radians(abs(passage.angle_deg) / count) / 2
         near = _segment_distance(placements, low, high) < reach + slack
         wanted = near[:-1] | near[1:]
+        rods = _rods(placements * voxel_mm, radius_mm + SAGITTA_MM, trim_mm - SAGITTA_MM)
         for index in np.flatnonzero(wanted):
-            rods = [
-                _rod(ends * voxel_mm, radius_mm + SAGITTA_MM, trim_mm - SAGITTA_MM)
-                for ends in placements[index : index + 2]
-            ]
-            tools.append((passage.hinge, manifold3d.Manifold.hull_points(np.concatenate(rods))))
+            hull = manifold3d.Manifold.hull_points(rods[index : index + 2].reshape(-1, 3))
+            tools.append((passage.hinge, hull))
     return tools
 
 
