@@ -33,6 +33,7 @@ VARIANTS = {
     "fold afterwards": "the energy alone is lowered; closure and planner filter afterwards",
     "one tree": "one spanning tree for each set of poses instead of several",
     "octants": "put in: eighths of cells count as they hold material (partial fill)",
+    "carving": "put in: cores of cells count, and what must be carved is weighed",
 }
 #: Variants of growth alone.
 GROWTH = {
@@ -96,6 +97,7 @@ class Unjudged(Unplanned):
 
 def changed(variant: str, voxels: Any) -> Any:
     """The change of a job that makes a variant."""
+    from fabfold.fold.cores import CORE
     from fabfold.fold.foldability import octants_of
 
     def change(job: Any) -> Any:
@@ -114,6 +116,8 @@ def changed(variant: str, voxels: Any) -> Any:
             judge = Unjudged(judge)
         elif variant == "octants":
             judge = replace(judge, octants=octants_of(voxels.subvoxels))
+        elif variant == "carving":
+            judge = replace(judge, carve=CORE, material=voxels.subvoxels)
         elif variant != "full":
             raise SystemExit(f"no such variant: {variant}")
         return replace(job, effort=effort, foldability=judge)
@@ -130,9 +134,9 @@ def run_variant(
     kit = runs.voxelized(model, folder)
     rounds = runs.rounds_of(kit, runs.recipe_of(kit, seed, joints))
     plain = rounds._job(0)
-    kernels = runs.warm_up(plain)
+    kernels = runs.warm_up(plain, joints)
     job = changed(variant, rounds.options[0])(plain)
-    runs.warm_up(job)
+    runs.warm_up(job, joints)
     clock = runs.Recorder(seconds)
     number, folded = 0, []
     while not clock.over():
@@ -195,7 +199,7 @@ def run_growth(model: runs.Model, folder: Path, variant: str, seed: int, joints:
     kit = runs.voxelized(model, folder)
     rounds = runs.rounds_of(kit, runs.recipe_of(kit, seed, joints))
     job = rounds._job(0)
-    runs.warm_up(job)
+    runs.warm_up(job, joints)
     problem, effort = job.problem, job.effort
     tables = problem.tables
     rng = np.random.default_rng([seed, 7])

@@ -146,23 +146,20 @@ def voxelized(model: Model, folder: Path, **options: Any) -> Any:
 def recipe_of(kit: Any, seed: int, joints: str | None) -> Any:
     """The recipe of one run: the product's defaults but for seed and joints."""
     fields = {**kit.recipe.model_dump(), "seed": seed}
-    if joints is not None and "joints" in type(kit.recipe).model_fields:
+    if joints is not None:
         fields["joints"] = joints
-    elif joints not in (None, "S"):
-        raise SystemExit(f"this version searches no joints {joints}")
     return type(kit.recipe)(**fields)
 
 
 def rounds_of(kit: Any, recipe: Any) -> Any:
     """Rounds of seeds over the kit's voxelizations for another recipe."""
-    from fabfold.lattice import load_template
     from fabfold.progress import SilentListener
     from fabfold.rounds import Rounds
     from fabfold.store import StageStore
 
     return Rounds(
         recipe,
-        load_template(recipe.template),
+        kit.template,
         kit.voxelize(),
         key="",
         store=StageStore(None),
@@ -171,7 +168,7 @@ def rounds_of(kit: Any, recipe: Any) -> Any:
     )
 
 
-def warm_up(job: Any) -> float:
+def warm_up(job: Any, joints: Any) -> float:
     """Compile all kernels, or load them from the cache, with a bar that folds; CPU seconds."""
     import numpy as np
 
@@ -190,6 +187,8 @@ def warm_up(job: Any) -> float:
         rigid=np.ones(7, dtype=bool),
         hinge=np.ones((7, 4), dtype=bool),
         depth=np.zeros((8, 6)),
+        double=np.ones(7, dtype=bool),
+        joints=joints,
     )
     run_seed(Job(bar, _plain(job.foldability), EFFORTS["quick"]), 1, lambda _: None, lambda: False)
     # The real problem may use kernels that the bar does not: two seconds of it, thrown away.
@@ -200,10 +199,13 @@ def warm_up(job: Any) -> float:
 
 def _plain(foldability: Any) -> Any:
     """The judge without what belongs to one voxelization."""
-    from dataclasses import fields, replace
+    from dataclasses import replace
 
-    names = {field.name for field in fields(foldability)}
-    return replace(foldability, octants=None) if "octants" in names else foldability
+    from fabfold.fold.foldability import LatticeFoldability
+
+    if not isinstance(foldability, LatticeFoldability):
+        return foldability
+    return replace(foldability, octants=None, material=None)
 
 
 class Recorder:
@@ -298,7 +300,7 @@ def timed_run(
                 jobs[option] = job if change is None else change(job)
             return jobs[option]
 
-        facts["kernels"] = warm_up(job_of(0))
+        facts["kernels"] = warm_up(job_of(0), rounds.recipe.joints)
     except FabfoldError as error:
         return {**facts, "error": str(error), "events": [], "trees": {}}
     jobs.clear()
