@@ -19,7 +19,7 @@ from fabfold.joinery.grooves import Passage
 from fabfold.joinery.links import link_body
 from fabfold.joinery.placement import double_layout, fittings, hinge_frames
 from fabfold.joinery.plates import grown_corners
-from fabfold.joinery.sizes import hinge_size
+from fabfold.joinery.sizes import hinge_size, smallest_voxel
 from fabfold.joinery.unite import Tally
 from fabfold.printing.profiles import load_profile
 from fabfold.progress import SilentProgress
@@ -28,6 +28,7 @@ from fabfold.solid.model import Solid
 from fabfold.tree.catalogue import double_joints
 from fabfold.tree.check import check_tree
 from fabfold.writing import write_kit
+from hinges.errors import FitError
 
 VOXEL, CLEARANCE = 20.0, 0.3
 PAIR = [[0, 0, 0], [1, 0, 0]]
@@ -323,3 +324,18 @@ def test_a_kit_names_its_link_everywhere(kit):
     kinds = {str(face.geom_type) for face in solids["link-00"].faces()}
     assert any("CYLINDER" in kind for kind in kinds)
     assert any("CONE" in kind for kind in kinds)
+
+
+@pytest.mark.parametrize(("clearance", "voxel"), [(0.3, 19.0), (0.5, 26.0)])
+def test_both_axes_on_one_edge_want_a_larger_voxel(clearance, voxel):
+    made = hinge_size(voxel, clearance).double("+y", (90.0, 90.0))
+    assert made.knuckles == 5
+    with pytest.raises(FitError, match="web"):
+        hinge_size(voxel - 1.0, clearance).double("+y", (90.0, 90.0))
+
+
+@pytest.mark.parametrize("clearance", [0.2, 0.3, 0.5, 0.6])
+def test_a_double_hinge_fits_wherever_a_single_one_does(clearance):
+    size = hinge_size(smallest_voxel(clearance), clearance)
+    for second in ("-y", "+z"):
+        assert size.double(second, (270.0, 270.0)).plate_mm >= 0.8
