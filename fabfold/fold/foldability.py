@@ -13,7 +13,11 @@ from fabfold.tree.system import HingeSystem
 if TYPE_CHECKING:
     from fabfold.fold.lattice import Plan
 
-__all__ = ["LatticeFoldability", "octants_of"]
+__all__ = ["LITTLE", "NEAR", "LatticeFoldability", "octants_of"]
+
+#: Quarter turns, and the share of all, that the planner may leave with whole cells for a look at
+#: cores.
+LITTLE, NEAR = 4, 0.3
 
 
 def octants_of(subvoxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -52,8 +56,9 @@ class LatticeFoldability:
         the bodies.
     carve : float, optional
         For trees that fold only once cells lose corners: half the side of the core that is to be
-        left of a cell, :data:`fabfold.fold.cores.CORE`. All answers but :meth:`path` then look at
-        cores alone; :meth:`path` looks at whole cells first. Not together with `octants`.
+        left of a cell, :data:`fabfold.fold.cores.CORE`. The closure test then looks at cores; the
+        planner looks at whole cells first, and at cores where it leaves little. Not together with
+        `octants`.
     material : (n, s, s, s) bool array, optional
         With `carve`: material of the cells in shape A. Paths that cannot be carved without
         cutting a hinge then do not count, and of several the one that costs least is taken.
@@ -111,15 +116,24 @@ class LatticeFoldability:
         return found.levels / found.total if found.total else float(found.levels > 0)
 
     def _look(self, system: HingeSystem, expansions: int) -> Plan:
-        """One look of the planner; hinges that carving would cut count as not resolved."""
+        """One look of the planner, at whole cells first and then at cores if it is worth it."""
         from fabfold.fold.lattice import find_path
 
         patience = min(expansions, self.patience)
-        sparing = self.carve is not None and self.material is not None
-        found = find_path(
-            self._seen(system), self.expansions, patience, short=sparing, carve=self.carve
-        )
-        if found.path is None or self.material is None or self.carve is None:
+        seen = self._seen(system)
+        found = find_path(seen, self.expansions, patience, short=False)
+        if self.carve is None or not 0 < found.levels <= max(LITTLE, NEAR * found.total):
+            return found
+        cored = self._look_at_cores(system, patience)
+        return cored if cored.levels < found.levels else found
+
+    def _look_at_cores(self, system: HingeSystem, patience: int) -> Plan:
+        """Hinges that carving would cut count as not resolved."""
+        from fabfold.fold.lattice import find_path
+
+        sparing = self.material is not None
+        found = find_path(system, self.expansions, patience, short=sparing, carve=self.carve)
+        if found.path is None or self.material is None:
             return found
         from fabfold.fold.carving import plan_carving
 
