@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from fabfold.errors import NoFoldError, NoTreeError
+from fabfold.errors import NoFoldError, NoTreeError, RecipeError
 from fabfold.fold.closing import closed
 from fabfold.fold.foldability import LatticeFoldability
 from fabfold.lattice import Template
@@ -55,7 +55,14 @@ def _usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> li
     ------
     NoTreeError
         If there is none.
+    RecipeError
+        If the template does not go with the wishes.
     """
+    if template.creases and (wishes.keeps or wishes.void):
+        raise RecipeError(
+            f"template {template.name!r} folds once more when it is filled: --keep and --void, "
+            "which speak of the sides of the filled template, do not go with it"
+        )
     if template.joints == "inside":
         # The last hinge to turn brings two halves together. With all four cells around its edge
         # full, a quarter turn before the end some of them would have been in one another.
