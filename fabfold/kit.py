@@ -287,7 +287,7 @@ class Kit:
         with self.listener.stage("export") as progress:
             write_kit(
                 target, self.recipe, profile, self.solid(), made, checks, progress,
-                self.granted(made.attempt, made.joinery),
+                self.granted(made.attempt, made.joinery), self._template,
             )  # fmt: skip
         if target != self.folder:
             if self._model is not None:

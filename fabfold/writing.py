@@ -9,14 +9,16 @@ from typing import Any
 from fabfold import __version__
 from fabfold.attempt import Attempt, Made
 from fabfold.export.colours import body_colours
+from fabfold.export.flat import flat_poses
 from fabfold.export.glb import write_glb
 from fabfold.export.picture import png_bytes, write_strip
 from fabfold.export.report import write_report
 from fabfold.export.sketch import picture_of_tree
 from fabfold.export.step import write_step
 from fabfold.export.stl import write_stl
-from fabfold.export.threemf import write_3mf
+from fabfold.export.threemf import posed, write_3mf
 from fabfold.files import write_bytes, write_json, write_text
+from fabfold.lattice import Template
 from fabfold.pareto import Solution
 from fabfold.printing.checks import Check
 from fabfold.printing.profiles import Profile
@@ -115,6 +117,7 @@ def write_kit(
     checks: list[Check],
     progress: Progress,
     granted: Sequence[dict[str, Any]] = (),
+    template: Template | None = None,
 ) -> None:
     """Write every file of the kit into `folder`.
 
@@ -130,6 +133,8 @@ def write_kit(
     progress : Progress
     granted : sequence of dict
         What became of each wish.
+    template : Template, optional
+        The target as it is filled; one with creases is also written as it lies flat.
     """
     tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
     name = recipe.name
@@ -152,6 +157,15 @@ def write_kit(
         },
         colours=colours,
     )
+    flat = None if template is None else flat_poses(joinery, tree, motion, template)
+    if template is not None and flat is not None:
+        write_3mf(
+            folder / f"{name}-flat.3mf",
+            posed(joinery, flat),
+            title=f"{name} laid flat as {template.name}",
+            metadata={"Application": f"fabfold {__version__}"},
+            colours=colours,
+        )
     progress.update(0.3, "STEP")
     write_step(folder / f"{name}.step", joinery, tree, title=name, colours=colours)
     progress.update(0.8, "animation")

@@ -6,10 +6,12 @@ from tree_cases import solid_problem, strip
 
 from fabfold.creases import folded_template, parts_of
 from fabfold.errors import ModelError, NoTreeError, RecipeError, TemplateError
+from fabfold.export.flat import flat_poses
 from fabfold.fold.closing import closed
 from fabfold.fold.foldability import LatticeFoldability
 from fabfold.fold.lattice import free_moves
 from fabfold.fold.motion import end_pose_error, motion_of
+from fabfold.joinery.model import Joinery
 from fabfold.lattice import load_template, template_names
 from fabfold.solid.model import Solid
 from fabfold.targets import find_input, load_target, named_target
@@ -178,6 +180,11 @@ def test_a_model_folds_into_the_flat_template_and_then_shut(tmp_path):
     poses = tree.body_poses(motion.angles_deg[-2])[tree.voxel_body]
     flat = np.einsum("nij,nj->ni", poses[:, :3, :3], tree.source) + poses[:, :3, 3]
     assert sorted(np.ptp(np.rint(flat), axis=0).astype(int).tolist()) == [0, 1, 7]
+    kit = Joinery((), 20.0, (0.0, 0.0, 0.0), 0.3, 2.5, 1.5, 3)
+    laid = flat_poses(kit, tree, motion, template)[tree.voxel_body]
+    flat = np.einsum("nij,nj->ni", laid[:, :3, :3], 20.0 * tree.source) + laid[:, :3, 3]
+    assert np.ptp(flat, axis=0).round(6).tolist() == [140.0, 20.0, 0.0]
+    assert (np.linalg.det(laid[:, :3, :3]) > 0).all()
     # Nothing else joins the two halves.
     half = tree.target[:, 2] == tree.target[0, 2]
     crossing = [edge for edge in tree.edges if half[edge.parent] != half[edge.child]]
