@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 from tree_cases import face_pairs, strip
+from typer.testing import CliRunner
 
+from fabfold.cli import app
 from fabfold.errors import NoTreeError, RecipeError
 from fabfold.fold.foldability import LatticeFoldability
 from fabfold.lattice import FACES, ROTATIONS, load_template, rotation_about
@@ -92,6 +94,22 @@ def test_recipe_refuses_wishes_it_cannot_read():
         make_recipe(model="sample:car", template="box-3x4x4", keep=("front",))
     with pytest.raises(RecipeError, match="prefer"):
         make_recipe(model="sample:car", template="box-3x4x4", prefer="speed")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["fit", "sample:car", "--keep", "front:+w"], "no side is called '+w'"),
+        (["fit", "sample:car", "--protect", "ball(1,2,3)"], "a region is box"),
+        (["fit", "sample:car", "--prefer", "speed"], "prefer = 'speed'"),
+        (["fold", "sample:car", "--pareto"], "--pareto goes with 'fabfold fit'"),
+    ],
+)
+def test_command_line_says_what_is_wrong(arguments, words, tmp_path):
+    found = CliRunner().invoke(app, [*arguments, "-o", str(tmp_path / "kit"), "-q"])
+    assert found.exit_code == 2
+    assert words in found.output
+    assert "Traceback" not in found.output
 
 
 def test_words_are_numbers_and_move_the_weights():
