@@ -43,7 +43,7 @@ def check_tree(tree: FoldTree) -> list[str]:
     found = _cells(tree) + _edges(tree)
     if found:
         return found
-    found = _bodies(tree) + _hinges(tree)
+    found = _bodies(tree) or _hinges(tree)
     if found:
         return found
     return _kinematics(tree) + _senses(tree) + _segments(tree) + _plates(tree)
