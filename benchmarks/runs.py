@@ -335,29 +335,35 @@ def timed_run(
     }
 
 
-def proven(model: Model, folder: Path, run: dict[str, Any], gap_step_deg: float) -> dict[str, Any]:
-    """Build, certify and sample the first and the best tree of a run.
+def proven(
+    model: Model,
+    folder: Path,
+    run: dict[str, Any],
+    wanted: Sequence[str],
+    gap_step_deg: float,
+    before: dict[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Build, certify and sample the first and the best tree of a run, or one of them.
 
     Where a tree is refused, the next one takes its place: the next later one for the first, the
-    next worse one for the best.
+    next worse one for the best. `before` is what was proven of this run already.
     """
     kit = voxelized(model, folder)
     rounds = rounds_of(kit, recipe_of(kit, run["seed"], run["joints"]))
-    known: dict[str, dict[str, Any]] = {}
+    out = {**(before or {"tried": {}})}
+    known = out["tried"]
 
-    def look(number: str) -> dict[str, Any]:
+    def holds(number: str) -> bool:
         if number not in known:
             known[number] = _prove(kit, rounds, run, number, gap_step_deg)
-        return known[number]
+        return bool(known[number]["ok"])
 
     numbers = sorted(run["trees"], key=int)
-    out: dict[str, Any] = {"first": None, "best": None}
-    for what, order in (("first", numbers), ("best", numbers[::-1])):
-        for number in order[:TRIES]:
-            if look(number)["ok"]:
-                out[what] = int(number)
-                break
-    return {**out, "tried": known}
+    for what in wanted:
+        order = numbers if what == "first" else numbers[::-1]
+        good = (int(number) for number in order[:TRIES] if holds(number))
+        out[what] = next(good, None)
+    return out
 
 
 def _prove(
