@@ -146,6 +146,12 @@ Joints = Annotated[
         "(quarter turns too).",
     ),
 ]
+DoubleWeight = Annotated[
+    float | None,
+    typer.Option(
+        "--double-weight", help="Energy of a double hinge; a single is 0.1. Default: 0.12."
+    ),
+]
 JointsInside = Annotated[
     bool | None,
     typer.Option(
@@ -276,6 +282,7 @@ def _stage(name: str, summary: str) -> None:
         keep_weight: KeepWeight = None,
         protect: Protect = None,
         joints: Joints = None,
+        double_weight: DoubleWeight = None,
         joints_inside: JointsInside = None,
         pick: Pick = None,
         workers: Workers = None,

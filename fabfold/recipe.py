@@ -97,6 +97,9 @@ class Recipe(BaseModel):
         JointSet,
         Field(description="hinges: S single, S+D double ones too, S90 and all: quarter turns too"),
     ] = "S"
+    double_weight: Annotated[float, Field(ge=0, le=100, description="weight of a double hinge")] = (
+        0.12
+    )
     joints_inside: Annotated[
         bool, Field(description="no hinge on the visible faces of the box")
     ] = False

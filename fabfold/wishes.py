@@ -33,11 +33,10 @@ REACH = 4.0
 def weights_of(recipe: Recipe) -> Weights:
     """Weights of the two energies, moved by the knob ``prefer``."""
     factor = REACH ** (2.0 * recipe.prefer - 1.0)
-    usual = Weights()
     return Weights(
         surface=recipe.surface_weight * factor,
         single=recipe.single_weight / factor,
-        double=recipe.single_weight / usual.single * usual.double / factor,
+        double=recipe.double_weight / factor,
     )
 
 
@@ -108,10 +107,11 @@ def wished(recipe: Recipe) -> list[Any]:
         "keep_weight": recipe.keep_weight if recipe.keep else 0.0,
         "protect": list(recipe.protect),
         "joints": recipe.joints,
+        "double_weight": recipe.double_weight,
         "joints_inside": recipe.joints_inside,
         "void": recipe.void,
         "prefer": recipe.prefer,
     }
     idle = {"keep": [], "keep_weight": 0.0, "protect": [], "joints_inside": False, "void": 0.0}
-    usual = {**idle, "prefer": 0.5, "joints": "S"}
+    usual = {**idle, "prefer": 0.5, "joints": "S", "double_weight": 0.12}
     return [[name, value] for name, value in fields.items() if value != usual[name]]

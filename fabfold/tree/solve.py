@@ -190,8 +190,9 @@ class _Search:
         self.generator = generator(int(self.rng.integers(2**62)))
         self.scale = _scale(len(problem))
         # Phase A has a joint weight of its own; double hinges keep their ratio to single ones.
-        weight = self.scale.joint * problem.tables.weight / max(problem.weights.single, 1e-9)
-        weight[: problem.tables.single + 1] = self.scale.joint
+        single, double = problem.weights.single, problem.weights.double
+        weight = np.full(len(problem.joints), self.scale.joint)
+        weight[problem.tables.single + 1 :] *= double / single if single > 0 else 1.0
         weight[0] = 0.0
         self.tables = problem.tables._replace(weight=weight)
         self.results: list[_State] = []
