@@ -1,0 +1,136 @@
+"""Rounds of the search in a kit: stopped and gone on, and with a budget in seconds."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from fabfold.errors import NoFoldError
+from fabfold.kit import Kit, open_kit
+from fabfold.search import Budget
+from fabfold.tree.check import check_tree
+
+OPTIONS = {"template": "box-2x2x2", "effort": "quick", "seed": 3}
+
+
+@pytest.fixture(scope="module")
+def bar(tmp_path_factory):
+    path = tmp_path_factory.mktemp("model") / "bar.stl"
+    trimesh.creation.box((80.0, 9.6, 9.6)).export(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(bar, tmp_path_factory):
+    """A kit whose search ran to its end."""
+    kit = Kit.from_model(bar, folder=tmp_path_factory.mktemp("whole"), workers=1, **OPTIONS)
+    kit.fit()
+    return kit
+
+
+def seeds_of(kit):
+    folder = kit.folder / "stages"
+    return {path.name: path.read_bytes() for path in sorted(folder.glob("seed-*.json"))}
+
+
+def content(kit):
+    return [json.loads(data) for data in seeds_of(kit).values()]
+
+
+class StopAtBetter:
+    """Interrupts the search once a better tree is known while a seed runs."""
+
+    def stage(self, name):
+        self.name = name
+        return self
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        return None
+
+    def update(self, share, message=""):
+        if self.name.startswith("fit") and "best" in message:
+            raise KeyboardInterrupt
+
+
+@pytest.fixture
+def stopped(bar, tmp_path):
+    kit = Kit.from_model(bar, folder=tmp_path / "stopped", workers=1, **OPTIONS)
+    kit.listener = StopAtBetter()
+    with pytest.raises(KeyboardInterrupt):
+        kit.fit()
+    return kit
+
+
+def test_interrupted_the_best_so_far_is_kept_and_going_on_makes_the_same(stopped, whole):
+    (kept,) = content(stopped)
+    assert kept["cut"] == 0.0
+    assert len(kept["candidates"]) == 1
+    again = open_kit(str(stopped.folder), workers=1)
+    again.fit()
+    assert seeds_of(again) == seeds_of(whole)
+    journals = [(k.folder / "stages" / "journal.json").read_bytes() for k in (again, whole)]
+    assert journals[0] == journals[1]
+
+
+def test_no_more_time_takes_the_best_so_far(stopped):
+    (kept,) = content(stopped)
+    again = open_kit(str(stopped.folder), seconds=0)
+    (best,) = again.fit()
+    assert best.path.tolist() == kept["candidates"][0]["path"]
+    assert check_tree(best.tree) == []
+    again.fold()
+    assert content(again) == [kept]
+
+
+def test_a_budget_goes_through_rounds_and_the_best_of_all_wins(whole, bar, tmp_path, monkeypatch):
+    # The clock of this test ticks once a look, so that the run is over after some seeds.
+    class Counting(Budget):
+        looks = 0
+
+        @property
+        def share(self):
+            type(self).looks += 1
+            return 0.0 if self.seconds is None else min(1.0, type(self).looks / 2000)
+
+        def restart(self):
+            type(self).looks = 0
+
+    monkeypatch.setattr("fabfold.rounds.Budget", Counting)
+    kit = Kit.from_model(bar, folder=tmp_path / "timed", workers=1, seconds=30, **OPTIONS)
+    found = kit.fit()
+    kept = content(kit)
+    energies = [c["tree"]["energy"]["total"] for seed in kept for c in seed["candidates"]]
+    assert found[0].energy["total"] == pytest.approx(min(energies))
+    cut = [seed["cut"] for seed in kept]
+    assert set(cut) <= {None, 30}
+    assert 30 in cut, "the seed that ran when the time was over"
+
+    # Without a budget the seeds that were cut run to their end, and the answer is as ever.
+    again = open_kit(str(kit.folder), workers=1)
+    again.fit()
+    mine = seeds_of(again)
+    assert {name: mine[name] for name in seeds_of(whole)} == seeds_of(whole)
+
+
+def test_more_time_goes_on_and_the_same_time_does_not_repeat(whole, monkeypatch, tmp_path):
+    kit = open_kit(str(whole.folder), folder=tmp_path / "more", workers=1, seconds=0)
+    with pytest.raises(NoFoldError, match="nothing folds yet after 0 s"):
+        kit.fit()
+    ran = []
+
+    def run_seeds(_pool, tasks, _hear, _over):
+        ran.extend(seed for (seed, _), _ in zip(tasks, range(6), strict=False))
+
+    monkeypatch.setattr("fabfold.rounds.run_seeds", run_seeds)
+    before = content(whole)
+    more = open_kit(str(whole.folder), workers=1, seconds=60)
+    best = more.fit()[0]
+    done = {30000 + k for k in range(len(before))}
+    assert not done & set(ran), "seeds that ran to their end are not run again"
+    assert min(ran) == max(done) + 1
+    energies = [c["tree"]["energy"]["total"] for seed in before for c in seed["candidates"]]
+    np.testing.assert_allclose(best.energy["total"], min(energies))
