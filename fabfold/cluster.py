@@ -26,7 +26,7 @@ from fabfold.errors import RecipeError, WorkerError
 from fabfold.remote import unpacked
 from fabfold.seeds import Done, Event, Job, Lost
 
-__all__ = ["Cluster"]
+__all__ = ["Cluster", "check_address"]
 
 #: Seconds to reach the scheduler, and to get an answer from it or a worker.
 CONNECT = 10.0
@@ -256,12 +256,23 @@ class Cluster:
             self._client.close(timeout=CONNECT)
 
 
-def _connect(address: str) -> Any:
-    """Client of the scheduler at `address`, which says nothing on the terminal by itself."""
+def check_address(address: str) -> None:
+    """Refuse what cannot be the address of a scheduler.
+
+    Raises
+    ------
+    RecipeError
+        If it is none.
+    """
     if not re.fullmatch(r"(tcp|tls)://(\[[0-9a-fA-F:]+\]|[^\s:/]+):\d{1,5}", address):
         raise RecipeError(
             f"--scheduler wants an address such as tcp://host:8786, found {address!r}"
         )
+
+
+def _connect(address: str) -> Any:
+    """Client of the scheduler at `address`, which says nothing on the terminal by itself."""
+    check_address(address)
     try:
         from distributed import Client
     except ImportError:

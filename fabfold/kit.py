@@ -88,6 +88,14 @@ class Kit:
         scheduler: str | None = None,
         seconds: float | None = None,
     ) -> None:
+        if workers is not None and workers < 1:
+            raise RecipeError(f"--workers {workers}: there must be at least one")
+        if seconds is not None and not seconds >= 0:
+            raise RecipeError(f"--time {seconds}: must be a number of seconds, 0 or more")
+        if scheduler is not None:
+            from fabfold.cluster import check_address
+
+            check_address(scheduler)
         self.recipe = recipe
         self.folder = folder
         self.workers = workers

@@ -98,3 +98,24 @@ def test_lists(what):
     assert {"samples": "sample:car", "templates": "box-AxBxC", "profiles": "mjf-pa12"}[what] in (
         done.stdout
     )
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--scheduler", "localhost"], ["--scheduler", "tcp://host:8786", "localhost"]),
+        (["--workers", "0"], ["--workers 0"]),
+        (["--time", "-1"], ["--time"]),
+        (["--time", "soon"], ["--time", "number"]),
+    ],
+)
+def test_wrong_ways_to_run_the_search_are_one_sentence_and_exit_code_2(tmp_path, options, words):
+    import trimesh
+
+    trimesh.creation.box((80.0, 9.6, 9.6)).export(tmp_path / "bar.stl")
+    done = fabfold("fit", "bar.stl", "-t", "box-2x2x2", *options, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    for word in words:
+        assert word in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["bar.stl"], "nothing is half written"
