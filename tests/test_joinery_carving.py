@@ -14,6 +14,7 @@ from fabfold.fold.carving import plan_carving
 from fabfold.fold.certify import certify
 from fabfold.fold.motion import quarter_path
 from fabfold.fold.replay import replay
+from fabfold.fold.sampled import sample_path
 from fabfold.joinery import build
 from fabfold.joinery.build import build_bodies
 from fabfold.joinery.carving import Carved
@@ -58,6 +59,20 @@ def test_carved_bodies_keep_the_gap_at_every_angle(case, request):
     tree, motion, _, joinery = request.getfixturevalue(case)
     assert joinery.rounded_cells > 0
     assert proof(tree, motion, joinery)["min_gap_mm"] == pytest.approx(CLEARANCE, abs=0.011)
+
+
+def test_samples_by_another_library_see_the_gap_too(lid):
+    pytest.importorskip("fcl")
+    tree, motion, _, joinery = lid
+    seen = sample_path(
+        tree.to_json(joinery.voxel_mm, joinery.origin_mm),
+        motion.to_json(),
+        {body.name: (body.vertices, body.faces) for body in joinery.bodies},
+        step_deg=1.0,
+        gap_step_deg=10.0,
+    )
+    assert seen.ok
+    assert seen.least_mm == pytest.approx(CLEARANCE, abs=0.01)
 
 
 def test_without_carving_they_jam(slot, monkeypatch):
