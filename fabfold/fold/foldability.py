@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.tree.foldability import Outlook
 from fabfold.tree.system import HingeSystem
 
 if TYPE_CHECKING:
@@ -87,16 +88,21 @@ class LatticeFoldability:
 
         return stuck_hinges(self._seen(system), carve=self.carve)
 
-    def remaining(self, system: HingeSystem, expansions: int) -> NDArray[np.int32]:
-        """Quarter turns of each hinge that the planner could not resolve, shape (h,).
+    def outlook(
+        self, system: HingeSystem, expansions: int, guide: NDArray[np.int32] | None = None
+    ) -> Outlook:
+        """What the planner could not resolve, and the steps that it found.
 
         Parameters
         ----------
         system : HingeSystem
         expansions : int
             The planner gives up after this many expansions without progress.
+        guide : (g, 5) int32 array, optional
+            Steps found for a similar system, to be tried first.
         """
-        return self._look(system, expansions).apart
+        found = self._look(system, expansions, guide)
+        return Outlook(found.apart, found.guide)
 
     def unresolved(self, system: HingeSystem, expansions: int) -> float:
         """Share of the quarter turns that the planner could not resolve.
@@ -115,24 +121,30 @@ class LatticeFoldability:
         found = self._look(system, expansions)
         return found.levels / found.total if found.total else float(found.levels > 0)
 
-    def _look(self, system: HingeSystem, expansions: int) -> Plan:
+    def _look(
+        self, system: HingeSystem, expansions: int, guide: NDArray[np.int32] | None = None
+    ) -> Plan:
         """One look of the planner, at whole cells first and then at cores if it is worth it."""
         from fabfold.fold.lattice import find_path
 
         patience = min(expansions, self.patience)
         seen = self._seen(system)
-        found = find_path(seen, self.expansions, patience, short=False)
+        found = find_path(seen, self.expansions, patience, short=False, guide=guide)
         if self.carve is None or not 0 < found.levels <= max(LITTLE, NEAR * found.total):
             return found
-        cored = self._look_at_cores(system, patience)
+        cored = self._look_at_cores(system, patience, found.guide)
         return cored if cored.levels < found.levels else found
 
-    def _look_at_cores(self, system: HingeSystem, patience: int) -> Plan:
+    def _look_at_cores(
+        self, system: HingeSystem, patience: int, guide: NDArray[np.int32]
+    ) -> Plan:
         """Hinges that carving would cut count as not resolved."""
         from fabfold.fold.lattice import find_path
 
         sparing = self.material is not None
-        found = find_path(system, self.expansions, patience, short=sparing, carve=self.carve)
+        found = find_path(
+            system, self.expansions, patience, short=sparing, carve=self.carve, guide=guide
+        )
         if found.path is None or self.material is None:
             return found
         from fabfold.fold.carving import plan_carving
@@ -144,11 +156,19 @@ class LatticeFoldability:
         apart[jammed] = 1
         return found._replace(levels=len(jammed), path=None, apart=apart)
 
-    def path(self, system: HingeSystem) -> NDArray[np.int32] | None:
+    def path(
+        self, system: HingeSystem, guide: NDArray[np.int32] | None = None
+    ) -> NDArray[np.int32] | None:
         """Folding path after shortcutting, or None where the planner finds none.
 
         A short look may meet by luck where a long one, which trades sides later, does not; so
         shorter patience is tried as well.
+
+        Parameters
+        ----------
+        system : HingeSystem
+        guide : (g, 5) int32 array, optional
+            Steps that :meth:`outlook` found for the system, to be tried first.
 
         Returns
         -------
@@ -159,10 +179,13 @@ class LatticeFoldability:
 
         seen = self._seen(system)
         looks = (self.patience, self.patience // 4, self.patience // 10)
-        for patience in looks:
-            found = find_path(seen, self.expansions, patience).path
-            if found is not None:
-                return found
+        for hint in (guide, None):
+            for patience in looks:
+                found = find_path(seen, self.expansions, patience, guide=hint).path
+                if found is not None:
+                    return found
+            if guide is None:
+                break
         if self.carve is None:
             return None
         if self.material is not None:

@@ -24,6 +24,7 @@ from fabfold.fold.turns import count_stuck, movable_hinges
 from fabfold.tree.system import HingeSystem
 
 __all__ = [
+    "NO_GUIDE",
     "PRICE",
     "REPULSION",
     "Plan",
@@ -55,6 +56,9 @@ class Plan(NamedTuple):
         Hinge index and signed quarter turns about its positive axis, one row a move.
     apart : (h,) int32 array
         Quarter turns of each hinge by which the two ends still differ; they add up to `levels`.
+    guide : (g, 5) int32 array
+        The steps found, complete or not, for the planning of a similar system: twice the middle
+        of the hinge's edge in A, its axis, and 1 or -1 for a step forth or back.
     """
 
     levels: int
@@ -62,6 +66,40 @@ class Plan(NamedTuple):
     expansions: int
     path: NDArray[np.int32] | None
     apart: NDArray[np.int32]
+    guide: NDArray[np.int32]
+
+
+#: No steps to be guided by.
+NO_GUIDE: NDArray[np.int32] = np.zeros((0, 5), dtype=np.int32)
+
+
+def _guide_in(system: HingeSystem, mech: Mechanism, guide: NDArray[np.int32]) -> NDArray[np.int16]:
+    """Steps of a guide whose hinges the system has, in the mechanism's numbers."""
+    place = np.argsort(mech.origin)
+    known = {
+        (*point, axis): int(place[hinge])
+        for hinge, (point, axis) in enumerate(
+            zip(system.point2.tolist(), system.axis.tolist(), strict=True)
+        )
+    }
+    steps = [
+        (known[x, y, z, axis], way)
+        for x, y, z, axis, way in guide.tolist()
+        if (x, y, z, axis) in known
+    ]
+    return np.array(steps, dtype=np.int16).reshape(-1, 2)
+
+
+def _guide_out(system: HingeSystem, mech: Mechanism, steps: NDArray[np.int16]) -> NDArray[np.int32]:
+    hinges = mech.origin[steps[:, 0]]
+    return np.concatenate(
+        [
+            np.asarray(system.point2, dtype=np.int32).reshape(-1, 3)[hinges],
+            np.asarray(system.axis, dtype=np.int32)[hinges, None],
+            steps[:, 1:].astype(np.int32),
+        ],
+        axis=1,
+    )
 
 
 def _ready(system: HingeSystem, carve: float | None = None) -> tuple[Mechanism, Scene, SweepTable]:
@@ -136,6 +174,7 @@ def find_path(
     short: bool = True,
     carve: float | None = None,
     price: float = PRICE,
+    guide: NDArray[np.int32] | None = None,
 ) -> Plan:
     """Search a folding path, one hinge at a time.
 
@@ -156,6 +195,8 @@ def find_path(
     price : float
         With `carve`: what a turn costs, in steps, for each pair of whole cells that it drives
         into each other.
+    guide : (g, 5) int32 array, optional
+        :attr:`Plan.guide` of a similar system: its steps are tried first.
 
     Returns
     -------
@@ -164,16 +205,19 @@ def find_path(
     mech, at, table = _ready(system, carve)
     whole = table if carve is None else sweep_table(mech.span)
     total = int(mech.steps.sum())
+    hint = _guide_in(system, mech, NO_GUIDE if guide is None else guide)
+    cost = 0.0 if carve is None else price
     levels, used, steps, differ = plan(
-        mech, at, table, expansions, patience, repulsion, whole, 0.0 if carve is None else price
+        mech, at, table, expansions, patience, repulsion, whole, cost, hint
     )
     apart = np.zeros(len(system.parent), dtype=np.int32)
     apart[mech.origin] = differ
+    found = _guide_out(system, mech, steps)
     if levels > 0:
-        return Plan(int(levels), total, int(used), None, apart)
+        return Plan(int(levels), total, int(used), None, apart, found)
     if short:
         steps = shorten(mech, at, table, whole, carve is not None, steps)
-    return Plan(0, total, int(used), _merged(system, mech, steps), apart)
+    return Plan(0, total, int(used), _merged(system, mech, steps), apart, found)
 
 
 def free_moves(

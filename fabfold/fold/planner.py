@@ -19,176 +19,50 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabfold.fold.front import (
+    Front,
+    begin,
+    distance,
+    grown,
+    joined,
+    new_front,
+    pop,
+    push,
+    retarget,
+    slot_of,
+)
 from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, pose_scene
 from fabfold.fold.sweep import SweepTable
 from fabfold.fold.turns import Work, obstacles, workspace, world_turn
 
-__all__ = ["Front", "plan"]
+__all__ = ["plan"]
 
 
-class Front(NamedTuple):
-    """The states that one side has reached.
+class Terms(NamedTuple):
+    """What a state's key counts beside its distance from the target, with room to work it out.
 
     Attributes
     ----------
-    tally : (4,) int64 array
-        Nodes, heap entries, expansions, best node.
-    state : (c, h) int8 array
-    before : (c,) int32 array
-        Node that this one came from, -1 at the start.
-    move : (c, 2) int16 array
-        Hinge and way (+1, -1) of the step that led here.
-    force : (c,) float64 array
-        Repulsion term of the key.
-    slots : (s,) int32 array
-        Open-addressing hash table of nodes, -1 where empty.
-    heap : (c,) int32 array
-        Nodes to expand, a binary heap by `key`, then by node.
-    key : (c,) float64 array
+    repulsion : float
+        Weight of the sum of 1/r over pairs of bodies.
+    middle : (b,) int32 array
+        Cell that stands for each body in that sum, -1 for a body without cells.
+    inverse : float64 array
+        1/r by r².
+    price : float
+        Of a pair of whole cells that a turn drives into each other; with 0 nobody looks.
+    whole : SweepTable
+        Sweeps of whole cells, where the planner's own table has those of their cores.
+    cuts, work : Work
     """
 
-    tally: NDArray[np.int64]
-    state: NDArray[np.int8]
-    before: NDArray[np.int32]
-    move: NDArray[np.int16]
-    force: NDArray[np.float64]
-    slots: NDArray[np.int32]
-    heap: NDArray[np.int32]
-    key: NDArray[np.float64]
-
-
-@njit(cache=True)
-def _hash(state: NDArray[np.int8]) -> np.uint64:
-    value = np.uint64(14695981039346656037)
-    for i in range(len(state)):
-        value = (value ^ np.uint64(state[i] + 1)) * np.uint64(1099511628211)
-        value ^= value >> np.uint64(29)
-    return value
-
-
-@njit(cache=True)
-def _front(hinges: int, room: int) -> Front:
-    slots = 64
-    while slots < 4 * room:
-        slots *= 2
-    return Front(
-        np.zeros(4, np.int64),
-        np.zeros((room, hinges), np.int8),
-        np.full(room, -1, np.int32),
-        np.zeros((room, 2), np.int16),
-        np.zeros(room, np.float64),
-        np.full(slots, -1, np.int32),
-        np.zeros(room, np.int32),
-        np.zeros(room, np.float64),
-    )
-
-
-@njit(cache=True)
-def _grown(front: Front) -> Front:
-    """Copy of a front with room for twice as many nodes."""
-    old = len(front.state)
-    new = _front(front.state.shape[1], 2 * old)
-    new.tally[:] = front.tally
-    new.state[:old] = front.state
-    new.before[:old] = front.before
-    new.move[:old] = front.move
-    new.force[:old] = front.force
-    new.heap[:old] = front.heap
-    new.key[:old] = front.key
-    for node in range(front.tally[0]):
-        new.slots[_slot(new, front.state[node])] = node
-    return new
-
-
-@njit(cache=True)
-def _slot(front: Front, state: NDArray[np.int8]) -> int:
-    """Place of a state in the hash table: where it is, or the empty place where it belongs."""
-    mask = len(front.slots) - 1
-    slot = np.int64(_hash(state)) & mask
-    while True:
-        node = front.slots[slot]
-        if node < 0:
-            return int(slot)
-        same = True
-        for i in range(len(state)):
-            if front.state[node, i] != state[i]:
-                same = False
-                break
-        if same:
-            return int(slot)
-        slot = (slot + 1) & mask
-
-
-@njit(cache=True)
-def _before(front: Front, a: int, b: int) -> bool:
-    return front.key[a] < front.key[b] or (front.key[a] == front.key[b] and a < b)
-
-
-@njit(cache=True)
-def _sift(front: Front, place: int) -> None:
-    size = front.tally[1]
-    heap = front.heap
-    node = heap[place]
-    while True:
-        child = 2 * place + 1
-        if child >= size:
-            break
-        if child + 1 < size and _before(front, heap[child + 1], heap[child]):
-            child += 1
-        if not _before(front, heap[child], node):
-            break
-        heap[place] = heap[child]
-        place = child
-    heap[place] = node
-
-
-@njit(cache=True)
-def _push(front: Front, node: int) -> None:
-    place = front.tally[1]
-    front.tally[1] += 1
-    heap = front.heap
-    while place > 0:
-        above = (place - 1) // 2
-        if not _before(front, node, heap[above]):
-            break
-        heap[place] = heap[above]
-        place = above
-    heap[place] = node
-
-
-@njit(cache=True)
-def _pop(front: Front) -> int:
-    node = front.heap[0]
-    front.tally[1] -= 1
-    size = front.tally[1]
-    if size > 0:
-        front.heap[0] = front.heap[size]
-        _sift(front, 0)
-    return int(node)
-
-
-@njit(cache=True)
-def _distance(a: NDArray[np.int8], b: NDArray[np.int8]) -> int:
-    total = 0
-    for i in range(len(a)):
-        total += abs(int(a[i]) - int(b[i]))
-    return total
-
-
-@njit(cache=True)
-def _retarget(front: Front, target: NDArray[np.int8]) -> None:
-    """Make new keys for a new target, and find the node nearest to it."""
-    best = -1
-    least = 1 << 30
-    for node in range(front.tally[0]):
-        far = _distance(front.state[node], target)
-        front.key[node] = far + front.force[node]
-        if far < least:
-            least = far
-            best = node
-    front.tally[3] = best
-    for place in range(front.tally[1] // 2 - 1, -1, -1):
-        _sift(front, place)
+    repulsion: float
+    middle: NDArray[np.int32]
+    inverse: NDArray[np.float64]
+    price: float
+    whole: SweepTable
+    cuts: Work
+    work: Work
 
 
 @njit(cache=True)
@@ -213,17 +87,10 @@ def _middles(mech: Mechanism) -> NDArray[np.int32]:
 
 
 @njit(cache=True)
-def _force_change(
-    mech: Mechanism,
-    at: Scene,
-    middle: NDArray[np.int32],
-    inverse: NDArray[np.float64],
-    k: int,
-    way: int,
-    work: Work,
-) -> float:
+def _force_change(mech: Mechanism, at: Scene, terms: Terms, k: int, way: int) -> float:
     """Change of the sum of 1/r over pairs of bodies when hinge `k` makes a step."""
-    pivot = work.pivot
+    middle, inverse = terms.middle, terms.inverse
+    pivot = terms.work.pivot
     axis, sense = world_turn(mech, at, k, way, pivot)
     u = (axis + 1) % 3
     v = (axis + 2) % 3
@@ -253,29 +120,37 @@ def _force_change(
 
 
 @njit(cache=True)
-def _start(front: Front, state: NDArray[np.int8], target: NDArray[np.int8]) -> None:
-    front.state[0] = state
-    front.slots[_slot(front, state)] = 0
-    front.tally[0] = 1
-    front.key[0] = _distance(state, target)
-    _push(front, 0)
-
-
-@njit(cache=True)
-def _trace(front: Front, node: int, out: NDArray[np.int16]) -> int:
-    """Steps from the start of a front to `node`, in order; returns how many."""
-    size = 0
-    at = node
-    while front.before[at] >= 0:
-        size += 1
-        at = front.before[at]
-    at = node
-    place = size
-    while front.before[at] >= 0:
-        place -= 1
-        out[place] = front.move[at]
-        at = front.before[at]
-    return size
+def _reach(
+    mech: Mechanism,
+    at: Scene,
+    terms: Terms,
+    front: Front,
+    node: int,
+    k: int,
+    way: int,
+    q: NDArray[np.int8],
+    slot: int,
+    target: NDArray[np.int8],
+) -> int:
+    """Add the state `q` that a step from `node` leads to; the scene still stands at `node`."""
+    new = front.tally[0]
+    front.tally[0] += 1
+    front.slots[slot] = new
+    front.state[new] = q
+    front.before[new] = node
+    front.move[new, 0] = k
+    front.move[new, 1] = way
+    front.force[new] = front.force[node]
+    if terms.repulsion > 0:
+        front.force[new] += terms.repulsion * _force_change(mech, at, terms, k, way)
+    if terms.price > 0:
+        front.force[new] += terms.price * obstacles(mech, at, terms.whole, k, way, terms.cuts)
+    far = distance(q, target)
+    front.key[new] = far + front.force[new]
+    push(front, new)
+    if far < distance(front.state[front.tally[3]], target):
+        front.tally[3] = new
+    return int(new)
 
 
 @njit(cache=True)
@@ -283,56 +158,112 @@ def _expand(
     mech: Mechanism,
     at: Scene,
     table: SweepTable,
+    terms: Terms,
     front: Front,
     other: Front,
     target: NDArray[np.int8],
-    weight: float,
-    middle: NDArray[np.int32],
-    inverse: NDArray[np.float64],
-    work: Work,
-    whole: SweepTable,
-    price: float,
-    cuts: Work,
 ) -> int:
     """Expand the best node of a front; returns a node that the other front has too, or -1."""
-    hinges = len(mech.up)
-    node = _pop(front)
+    node = pop(front)
     front.tally[2] += 1
     q = front.state[node].copy()
     pose_scene(mech, at, q)
     met = -1
-    for k in range(hinges):
+    for k in range(len(mech.up)):
         for way in (1, -1):
             step = q[k] + way
             if step < 0 or step > mech.steps[k]:
                 continue
             q[k] = step
-            slot = _slot(front, q)
-            if front.slots[slot] < 0 and obstacles(mech, at, table, k, way, work) == 0:
-                new = front.tally[0]
-                front.tally[0] += 1
-                front.slots[slot] = new
-                front.state[new] = q
-                front.before[new] = node
-                front.move[new, 0] = k
-                front.move[new, 1] = way
-                front.force[new] = front.force[node]
-                if weight > 0:
-                    front.force[new] += weight * _force_change(
-                        mech, at, middle, inverse, k, way, work
-                    )
-                if price > 0:
-                    front.force[new] += price * obstacles(mech, at, whole, k, way, cuts)
-                far = _distance(q, target)
-                front.key[new] = far + front.force[new]
-                _push(front, new)
-                if far < _distance(front.state[front.tally[3]], target):
-                    front.tally[3] = new
-                if met < 0 and other.slots[_slot(other, q)] >= 0:
+            slot = slot_of(front, q)
+            if front.slots[slot] < 0 and obstacles(mech, at, table, k, way, terms.work) == 0:
+                new = _reach(mech, at, terms, front, node, k, way, q, slot, target)
+                if met < 0 and other.slots[slot_of(other, q)] >= 0:
                     met = new
             q[k] -= way
     clear_scene(mech, at)
     return met
+
+
+@njit(cache=True)
+def _steps_of(mech: Mechanism, guide: NDArray[np.int16], way: int) -> NDArray[np.int16]:
+    """The guide's steps as one side makes them, after those that the guide leaves out.
+
+    What is new goes best at once: put last, it is mostly locked in by then.
+    """
+    missing = mech.steps.copy()
+    for i in range(len(guide)):
+        missing[guide[i, 0]] -= guide[i, 1]
+    more = 0
+    for k in range(len(missing)):
+        more += max(0, missing[k])
+    known = len(guide)
+    out = np.empty((known + more, 2), np.int16)
+    for i in range(known):
+        out[more + i, 0] = guide[i, 0] if way > 0 else guide[known - 1 - i, 0]
+        out[more + i, 1] = guide[i, 1] if way > 0 else -guide[known - 1 - i, 1]
+    at = 0
+    for k in range(len(missing)):
+        for _ in range(max(0, missing[k])):
+            out[at, 0] = k
+            out[at, 1] = way
+            at += 1
+    return out
+
+
+@njit(cache=True)
+def _lead(
+    mech: Mechanism,
+    at: Scene,
+    table: SweepTable,
+    terms: Terms,
+    front: Front,
+    other: Front,
+    target: NDArray[np.int8],
+    steps: NDArray[np.int16],
+) -> tuple[Front, int]:
+    """Make a side's first states by following steps in order, each as soon as it is free.
+
+    Returns
+    -------
+    front : Front
+        The same, or its copy with more room.
+    met : int
+        A node that the other front has too, or -1.
+    """
+    done = np.zeros(len(steps), np.bool_)
+    q = front.state[0].copy()
+    node = 0
+    i = 0
+    pose_scene(mech, at, q)
+    while i < len(steps):
+        k = int(steps[i, 0])
+        way = int(steps[i, 1])
+        step = q[k] + way
+        if (
+            done[i]
+            or step < 0
+            or step > mech.steps[k]
+            or obstacles(mech, at, table, k, way, terms.work) > 0
+        ):
+            i += 1
+            continue
+        done[i] = True
+        i = 0
+        q[k] = step
+        if front.tally[0] == len(front.state):
+            front = grown(front)
+        slot = slot_of(front, q)
+        if front.slots[slot] >= 0:
+            node = int(front.slots[slot])
+        else:
+            node = _reach(mech, at, terms, front, node, k, way, q, slot, target)
+        clear_scene(mech, at)
+        if other.slots[slot_of(other, q)] >= 0:
+            return front, node
+        pose_scene(mech, at, q)
+    clear_scene(mech, at)
+    return front, -1
 
 
 @njit(cache=True)
@@ -345,6 +276,7 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
     weight: float,
     whole: SweepTable,
     price: float,
+    guide: NDArray[np.int16],
 ) -> tuple[int, int, NDArray[np.int16], NDArray[np.int8]]:
     """Search a path from A to B.
 
@@ -364,6 +296,9 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
         `table` only need carving.
     price : float
         Of a cell that has to be carved, against one step; with 0 `whole` is not looked at.
+    guide : (g, 2) int16 array
+        Hinge and way of steps from A to B, tried first: in this order, each as soon as it is
+        free, and backwards from B. Mostly the path of a similar mechanism; may be empty.
 
     Returns
     -------
@@ -371,7 +306,8 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
         Steps by which the two best states still differ; 0 means that a path was found.
     expansions : int
     path : (m, 2) int16 array
-        Hinge of the mechanism and way (+1, -1) of each step; empty unless `levels` is 0.
+        Hinge of the mechanism and way (+1, -1) of each step from A. Unless `levels` is 0, it
+        leads to the best state of one side, and goes on from that of the other side to B.
     apart : (h,) int8 array
         Steps of each hinge by which the two best states differ; they add up to `levels`.
     """
@@ -389,23 +325,27 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
     if total == 0:
         return 0, 0, empty, start
 
-    middle = _middles(mech)
     # Softened, so that bodies whose middles coincide do not count for everything.
     inverse = 1.0 / np.sqrt(0.25 + np.arange(12 * mech.reach * mech.reach + 1))
-    work = workspace(0)
-    cuts = workspace(32)
-    mine = _front(hinges, 1024)
-    other = _front(hinges, 1024)
-    _start(mine, start, finish)
-    _start(other, finish, start)
+    terms = Terms(weight, _middles(mech), inverse, price, whole, workspace(32), workspace(0))
+    mine = new_front(hinges, 1024)
+    other = new_front(hinges, 1024)
+    begin(mine, start, finish)
+    begin(other, finish, start)
     forward = True
-    target = finish.copy()
-    levels = total
-    apart = finish.copy()
-    stalled = 0
-    idle = 0
     used = 0
     met = -1
+    if len(guide) > 0:
+        steps = _steps_of(mech, guide, -1)
+        other, _ = _lead(mech, at, table, terms, other, mine, start, steps)
+        steps = _steps_of(mech, guide, 1)
+        mine, met = _lead(mech, at, table, terms, mine, other, finish, steps)
+    target = other.state[other.tally[3]].copy()
+    retarget(mine, target)
+    levels = distance(mine.state[mine.tally[3]], target)
+    apart = np.abs(mine.state[mine.tally[3]] - target)
+    stalled = 0
+    idle = 0
     while used < limit and met < 0:
         if mine.tally[1] == 0 or idle >= patience:
             stalled += 1
@@ -417,8 +357,8 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
             target = mine.state[mine.tally[3]].copy()
             mine, other = other, mine
             forward = not forward
-            _retarget(mine, target)
-            far = _distance(mine.state[mine.tally[3]], target)
+            retarget(mine, target)
+            far = distance(mine.state[mine.tally[3]], target)
             if far < levels:
                 levels = far
                 apart = np.abs(mine.state[mine.tally[3]] - target)
@@ -426,31 +366,19 @@ def plan(  # noqa: PLR0915 - the loop that trades sides, kept whole
             idle = 0
             continue
         while mine.tally[0] + 2 * hinges > len(mine.state):
-            mine = _grown(mine)
-        met = _expand(
-            mech, at, table, mine, other, target, weight, middle, inverse, work,
-            whole, price, cuts,
-        )  # fmt: skip
+            mine = grown(mine)
+        met = _expand(mech, at, table, terms, mine, other, target)
         used += 1
         idle += 1
-        far = _distance(mine.state[mine.tally[3]], target)
+        far = distance(mine.state[mine.tally[3]], target)
         if far < levels:
             levels = far
             apart = np.abs(mine.state[mine.tally[3]] - target)
             idle = 0
             stalled = 0
     if met < 0:
-        return levels, used, empty, apart
-
-    there = other.slots[_slot(other, mine.state[met])]
-    if not forward:
-        mine, other = other, mine
-        met, there = there, met
-    steps = np.empty((mine.tally[0] + other.tally[0], 2), np.int16)
-    size = _trace(mine, met, steps)
-    rest = _trace(other, there, steps[size:])
-    path = steps[: size + rest].copy()
-    for i in range(rest):
-        path[size + i, 0] = steps[size + rest - 1 - i, 0]
-        path[size + i, 1] = -steps[size + rest - 1 - i, 1]
+        path = joined(mine, mine.tally[3], other, other.tally[3], forward)
+        return max(1, levels), used, path, apart
+    there = other.slots[slot_of(other, mine.state[met])]
+    path = joined(mine, met, other, there, forward)
     return 0, used, path, start

@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.tree.system import HingeSystem
 
-__all__ = ["Foldability"]
+__all__ = ["Foldability", "Outlook"]
+
+
+class Outlook(NamedTuple):
+    """How far a system folds.
+
+    Attributes
+    ----------
+    left : (h,) int32 array
+        Quarter turns of each hinge that could not be resolved; all zero when it folds.
+    guide : (g, 5) int32 array
+        The steps found, complete or not: twice the middle of the hinge's edge in A, its
+        axis, and 1 or -1 for a quarter turn forth or back.
+    """
+
+    left: NDArray[np.int32]
+    guide: NDArray[np.int32]
 
 
 class Foldability(Protocol):
@@ -37,19 +53,18 @@ class Foldability(Protocol):
             From shape A and from shape B.
         """
 
-    def remaining(self, system: HingeSystem, expansions: int) -> NDArray[np.int32]:
-        """Quarter turns of each hinge that the planner could not find.
+    def outlook(
+        self, system: HingeSystem, expansions: int, guide: NDArray[np.int32] | None = None
+    ) -> Outlook:
+        """What the planner could not resolve, and the steps that it found.
 
         Parameters
         ----------
         system : HingeSystem
         expansions : int
             The planner gives up after this many expansions without progress.
-
-        Returns
-        -------
-        (h,) int32 array
-            All zero when it folds.
+        guide : (g, 5) int32 array, optional
+            Steps found for a similar system, to be tried first.
         """
 
     def unresolved(self, system: HingeSystem, expansions: int) -> float:

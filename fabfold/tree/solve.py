@@ -13,7 +13,7 @@ from fabfold.errors import NoFoldError, NoTreeError
 from fabfold.lattice import parity
 from fabfold.tree.build import HingeChoice, SpanningTree, fold_tree, hinge_choice
 from fabfold.tree.effort import Effort
-from fabfold.tree.foldability import Foldability
+from fabfold.tree.foldability import Foldability, Outlook
 from fabfold.tree.grow import energy_of, fill_beam
 from fabfold.tree.model import FoldTree
 from fabfold.tree.problem import TreeProblem
@@ -76,6 +76,7 @@ class _State:
     tree: SpanningTree | None
     penalty: float
     focus: NDArray[np.int32] = field(default_factory=lambda: _NOWHERE)
+    guide: NDArray[np.int32] | None = None
 
 
 @dataclass(frozen=True)
@@ -261,34 +262,46 @@ class _Search:
 
     # --- judging ---------------------------------------------------------------------------
 
-    def remaining(self, tree: SpanningTree) -> NDArray[np.int32]:
-        """Quarter turns of each hinge that the planner leaves, with a long look where few are."""
+    def outlook(self, tree: SpanningTree, guide: NDArray[np.int32] | None) -> Outlook:
+        """What the planner leaves, with a look without the guide where that is little."""
         self.statistics.glances += 1
-        left = self.judge.remaining(tree.system, self.effort.glance)
-        if 0 < left.sum() <= self.effort.near * 2 * len(left):
+        found = self.judge.outlook(tree.system, self.effort.glance, guide)
+        left = found.left.sum()
+        if 0 < left <= self.effort.near * 2 * len(found.left):
             self.statistics.looks += 1
-            left = self.judge.remaining(tree.system, self.effort.look)
-        return left
+            other = self.judge.outlook(tree.system, self.effort.look)
+            if other.left.sum() < left:
+                return other
+        return found
 
     def judged(
-        self, pose: NDArray[np.int32], energy: float, keys: set[tuple[int, int]], bound: float
+        self, pose: NDArray[np.int32], energy: float, before: _State | None, bound: float
     ) -> _State | None:
-        """The best spanning tree for these poses, or None where its penalty exceeds `bound`."""
+        """The best spanning tree for these poses, or None where its penalty exceeds `bound`.
+
+        Hinges and steps are kept from the state `before` where that is possible.
+        """
         choice = hinge_choice(self.problem, pose)
         self.statistics.judged += 1
         best: _State | None = None
-        for tree in self.trees(choice, keys, self.effort.trees):
+        kept: set[tuple[int, int]] = set()
+        guide = None
+        if before is not None and before.tree is not None:
+            kept, guide = before.tree.keys, before.guide
+        for tree in self.trees(choice, kept, self.effort.trees):
             stuck = self.judge.stuck_hinges(tree.system)
             penalty = self.scale.stuck * float(stuck.sum())
             trouble = stuck.any(axis=0)
+            steps = guide
             if penalty == 0:
                 self.statistics.closed += 1
-                left = self.remaining(tree)
-                trouble = left > 0
-                penalty = self.scale.stuck * float(left.sum()) / max(1, 2 * len(left))
+                found = self.outlook(tree, guide)
+                trouble = found.left > 0
+                penalty = self.scale.stuck * float(found.left.sum()) / max(1, 2 * len(trouble))
+                steps = found.guide
             if best is None or penalty < best.penalty:
                 focus = np.unique(tree.joints[trouble, :2]).astype(np.int32)
-                best = _State(pose, energy, tree, penalty, focus)
+                best = _State(pose, energy, tree, penalty, focus, steps)
             if penalty == 0:
                 break
         if best is None or best.penalty > bound:
@@ -300,7 +313,7 @@ class _Search:
     def fold(self, start: _State) -> _State | None:
         """Phase A: trade energy for foldability until a tree folds."""
         scale, count = self.scale, len(self.problem)
-        now = self.judged(start.pose, start.energy, set(), math.inf)
+        now = self.judged(start.pose, start.energy, None, math.inf)
         if now is None:
             return None
         # Closing (no hinge stuck for good) costs little a step; looks at the planner cost much.
@@ -323,7 +336,7 @@ class _Search:
                     continue
                 pose, energy, _ = found
             before = self.statistics.glances
-            fresh = self.judged(pose, energy, now.tree.keys, value - scale.cost * energy)
+            fresh = self.judged(pose, energy, now, value - scale.cost * energy)
             looked = self.statistics.glances - before
             glances += looked
             step += looked == 0
@@ -348,7 +361,7 @@ class _Search:
             if found is None:
                 continue
             assert now.tree is not None
-            fresh = self.judged(found[0], found[1], now.tree.keys, 0.0)
+            fresh = self.judged(found[0], found[1], now, 0.0)
             if fresh is None:
                 continue
             now = fresh
