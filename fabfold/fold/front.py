@@ -41,8 +41,10 @@ class Front(NamedTuple):
     slots : (s,) int32 array
         Open-addressing hash table of nodes, -1 where empty.
     heap : (c,) int32 array
-        Nodes to expand, a binary heap by `key`, then by node.
+        What to expand next, a binary heap: ``2 * node`` stands for a node's steps towards the
+        target, ``2 * node + 1`` for its other steps, which bring nothing before those do.
     key : (c,) float64 array
+        Of each node; its other steps have the key plus one.
     """
 
     tally: NDArray[np.int64]
@@ -120,7 +122,9 @@ def slot_of(front: Front, state: NDArray[np.int8]) -> int:
 
 @njit(cache=True)
 def _before(front: Front, a: int, b: int) -> bool:
-    return front.key[a] < front.key[b] or (front.key[a] == front.key[b] and a < b)
+    first = front.key[a >> 1] + (a & 1)
+    second = front.key[b >> 1] + (b & 1)
+    return first < second or (first == second and a < b)
 
 
 @njit(cache=True)
@@ -142,30 +146,30 @@ def _sift(front: Front, place: int) -> None:
 
 
 @njit(cache=True)
-def push(front: Front, node: int) -> None:
-    """Put a node, whose key is set, among those to expand."""
+def push(front: Front, entry: int) -> None:
+    """Put an entry, the key of whose node is set, into the heap."""
     place = front.tally[1]
     front.tally[1] += 1
     heap = front.heap
     while place > 0:
         above = (place - 1) // 2
-        if not _before(front, node, heap[above]):
+        if not _before(front, entry, heap[above]):
             break
         heap[place] = heap[above]
         place = above
-    heap[place] = node
+    heap[place] = entry
 
 
 @njit(cache=True)
 def pop(front: Front) -> int:
-    """Take out the node with the least key."""
-    node = front.heap[0]
+    """Take out the entry with the least key."""
+    entry = front.heap[0]
     front.tally[1] -= 1
     size = front.tally[1]
     if size > 0:
         front.heap[0] = front.heap[size]
         _sift(front, 0)
-    return int(node)
+    return int(entry)
 
 
 @njit(cache=True)
@@ -189,6 +193,8 @@ def retarget(front: Front, target: NDArray[np.int8]) -> None:
             least = far
             best = node
     front.tally[3] = best
+    for place in range(front.tally[1]):
+        front.heap[place] &= ~1  # other steps lead to the new target
     for place in range(front.tally[1] // 2 - 1, -1, -1):
         _sift(front, place)
 

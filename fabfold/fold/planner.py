@@ -147,7 +147,7 @@ def _reach(
         front.force[new] += terms.price * obstacles(mech, at, terms.whole, k, way, terms.cuts)
     far = distance(q, target)
     front.key[new] = far + front.force[new]
-    push(front, new)
+    push(front, 2 * new)
     if far < distance(front.state[front.tally[3]], target):
         front.tally[3] = new
     return int(new)
@@ -163,8 +163,10 @@ def _expand(
     other: Front,
     target: NDArray[np.int8],
 ) -> int:
-    """Expand the best node of a front; returns a node that the other front has too, or -1."""
-    node = pop(front)
+    """Expand the best entry of a front; returns a node that the other front has too, or -1."""
+    entry = pop(front)
+    node = entry >> 1
+    others = entry & 1
     front.tally[2] += 1
     q = front.state[node].copy()
     pose_scene(mech, at, q)
@@ -172,7 +174,8 @@ def _expand(
     for k in range(len(mech.up)):
         for way in (1, -1):
             step = q[k] + way
-            if step < 0 or step > mech.steps[k]:
+            nearer = way * (target[k] - q[k]) > 0
+            if step < 0 or step > mech.steps[k] or nearer == (others > 0):
                 continue
             q[k] = step
             slot = slot_of(front, q)
@@ -182,6 +185,8 @@ def _expand(
                     met = new
             q[k] -= way
     clear_scene(mech, at)
+    if others == 0:
+        push(front, entry + 1)
     return met
 
 
