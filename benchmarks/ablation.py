@@ -56,14 +56,14 @@ class Unclosed:
     def stuck_hinges(self, system: Any) -> Any:
         return np.zeros((2, len(system.parent)), dtype=bool)
 
-    def remaining(self, system: Any, expansions: int) -> Any:
-        return self.judge.remaining(system, expansions)
+    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        return self.judge.outlook(system, expansions, guide)
 
     def unresolved(self, system: Any, expansions: int) -> float:
         return float(self.judge.unresolved(system, expansions))
 
-    def path(self, system: Any) -> Any:
-        return self.judge.path(system)
+    def path(self, system: Any, guide: Any = None) -> Any:
+        return self.judge.path(system, guide)
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,11 @@ class Unplanned(Unclosed):
     def stuck_hinges(self, system: Any) -> Any:
         return self.judge.stuck_hinges(system)
 
-    def remaining(self, system: Any, expansions: int) -> Any:
-        return np.zeros(len(system.parent), dtype=np.int32)
+    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        from fabfold.fold.lattice import NO_GUIDE
+        from fabfold.tree.foldability import Outlook
+
+        return Outlook(np.zeros(len(system.parent), dtype=np.int32), NO_GUIDE)
 
     def unresolved(self, system: Any, expansions: int) -> float:
         return 0.0

@@ -37,19 +37,19 @@ class Recorder:
     def stuck_hinges(self, system: Any) -> Any:
         return self.judge.stuck_hinges(system)
 
-    def remaining(self, system: Any, expansions: int) -> Any:
-        left = self.judge.remaining(system, expansions)
-        if left.any():
+    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        found = self.judge.outlook(system, expansions, guide)
+        if found.left.any():
             self.seen += 1
             if self.seen % 20 == 1 and len(self.missed) < self.wanted:
                 self.missed.append(system)
-        return left
+        return found
 
     def unresolved(self, system: Any, expansions: int) -> float:
         return float(self.judge.unresolved(system, expansions))
 
-    def path(self, system: Any) -> Any:
-        return self.judge.path(system)
+    def path(self, system: Any, guide: Any = None) -> Any:
+        return self.judge.path(system, guide)
 
 
 def near_misses(voxels: Any, template: str, count: int) -> list[Any]:

@@ -73,13 +73,14 @@ def do_tree(side: int, seed: int, folder: Path, budget: float) -> None:
     class Watched(LatticeFoldability):
         """Notes how near the planner came."""
 
-        def remaining(self, system: Any, expansions: int) -> Any:
-            left = super().remaining(system, expansions)
+        def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
+            found = super().outlook(system, expansions, guide)
+            left = found.left
             share = (int(left.sum()), int(np.abs(system.turns).sum()))
             if best[0] is None or share[0] * best[0][1] < best[0][0] * share[1]:
                 best[0] = share
                 say(left=share, first_tree=first_tree, hinges=len(system.turns))
-            return left
+            return found
 
         def stuck_hinges(self, system: Any) -> Any:
             stuck = super().stuck_hinges(system)

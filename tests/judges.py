@@ -33,9 +33,9 @@ def mark_of(system):
 class Recording(LatticeFoldability):
     """Notes what it is asked."""
 
-    def path(self, system):
+    def path(self, system, guide=None):
         self.__dict__.setdefault("asked", []).append(mark_of(system))
-        return super().path(system)
+        return super().path(system, guide)
 
 
 def first_question(problem, seed, effort):
@@ -52,12 +52,12 @@ class Poisoned(LatticeFoldability):
         super().__init__()
         self.__dict__.update(mark=mark, exits=exits)
 
-    def path(self, system):
+    def path(self, system, guide=None):
         if mark_of(system) == self.mark:
             if self.exits:
                 os._exit(3)
             raise ZeroDivisionError("poisoned")
-        return super().path(system)
+        return super().path(system, guide)
 
 
 class Deadly(LatticeFoldability):
@@ -67,22 +67,22 @@ class Deadly(LatticeFoldability):
         super().__init__()
         self.__dict__.update(folder=str(folder), deaths=deaths)
 
-    def path(self, system):
+    def path(self, system, guide=None):
         dead = Path(self.folder)
         if len(list(dead.iterdir())) < self.deaths:
             (dead / str(os.getpid())).touch()
             os.kill(os.getpid(), signal.SIGKILL)
-        return super().path(system)
+        return super().path(system, guide)
 
 
 class Deaf(LatticeFoldability):
     """Answers one question for a path, then never comes back."""
 
-    def path(self, system):
+    def path(self, system, guide=None):
         if "answered" in self.__dict__:
             time.sleep(3600)
         self.__dict__["answered"] = True
-        return super().path(system)
+        return super().path(system, guide)
 
 
 class Announcing(LatticeFoldability):
@@ -92,9 +92,9 @@ class Announcing(LatticeFoldability):
         super().__init__()
         self.__dict__.update(folder=str(folder))
 
-    def path(self, system):
+    def path(self, system, guide=None):
         folder = Path(self.folder)
         (folder / str(os.getpid())).touch()
         while not (folder / "go").exists():
             time.sleep(0.05)
-        return super().path(system)
+        return super().path(system, guide)

@@ -204,7 +204,7 @@ def test_judge_looks_at_cores_only_when_asked(slot):
     assert judge.stuck(system) == (0, 0)
     assert not judge.stuck_hinges(system).any()
     assert judge.unresolved(system, 100) == 0.0
-    assert not judge.remaining(system, 100).any()
+    assert not judge.outlook(system, 100).left.any()
     assert LatticeFoldability(carve=CORE).path(system).tolist() == path.tolist()
 
 

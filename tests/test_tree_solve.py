@@ -154,8 +154,10 @@ def test_full_template_of_125_cells_is_filled():
 
 def test_nothing_folds_without_budget(dog):
     class Stubborn(LatticeFoldability):
-        def remaining(self, system, expansions):
-            return np.ones(len(system.parent), dtype=np.int32)
+        def outlook(self, system, expansions, guide=None):
+            return super().outlook(system, 1)._replace(
+                left=np.ones(len(system.parent), dtype=np.int32)
+            )
 
     with pytest.raises(NoFoldError, match="none of"):
         solve(dog, 0, Stubborn(), Effort(restarts=2))

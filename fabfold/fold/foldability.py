@@ -135,9 +135,7 @@ class LatticeFoldability:
         cored = self._look_at_cores(system, patience, found.guide)
         return cored if cored.levels < found.levels else found
 
-    def _look_at_cores(
-        self, system: HingeSystem, patience: int, guide: NDArray[np.int32]
-    ) -> Plan:
+    def _look_at_cores(self, system: HingeSystem, patience: int, guide: NDArray[np.int32]) -> Plan:
         """Hinges that carving would cut count as not resolved."""
         from fabfold.fold.lattice import find_path
 

@@ -82,8 +82,16 @@ class Foldability(Protocol):
             0.0 when it folds, up to 1.0 when nothing moves.
         """
 
-    def path(self, system: HingeSystem) -> NDArray[np.int32] | None:
+    def path(
+        self, system: HingeSystem, guide: NDArray[np.int32] | None = None
+    ) -> NDArray[np.int32] | None:
         """Folding path after shortcutting, or None where the planner finds none.
+
+        Parameters
+        ----------
+        system : HingeSystem
+        guide : (g, 5) int32 array, optional
+            Steps that :meth:`outlook` found for the system, to be tried first.
 
         Returns
         -------

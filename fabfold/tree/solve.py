@@ -381,7 +381,7 @@ class _Search:
     def candidate(self, state: _State) -> Candidate | None:
         """The tree and path of a state; None where the long path search fails."""
         assert state.tree is not None
-        path = self.judge.path(state.tree.system)
+        path = self.judge.path(state.tree.system, state.guide)
         if path is None:
             return None
         return Candidate(fold_tree(self.problem, state.pose, state.tree), path, self.seed)
