@@ -29,6 +29,7 @@ VARIANTS = {
     "no improvement": "grown trees are only tested: no phase A, no phase B",
     "no polish": "phase A alone: the first tree that folds is the result",
     "no closure": "the objective asks the planner alone, not the closure test",
+    "no guide": "the planner starts each tree from nothing, not along the steps of the last",
     "no planner": "the objective asks the closure test alone; the planner filters afterwards",
     "fold afterwards": "the energy alone is lowered; closure and planner filter afterwards",
     "one tree": "one spanning tree for each set of poses instead of several",
@@ -45,57 +46,55 @@ GROWTH = {
 
 
 @dataclass(frozen=True)
-class Unclosed:
-    """A judge that never asks the closure test."""
+class Judge:
+    """The product's judge of folding, for others to leave something out."""
 
     judge: Any
 
     def stuck(self, system: Any) -> tuple[int, int]:
-        return (0, 0)
-
-    def stuck_hinges(self, system: Any) -> Any:
-        return np.zeros((2, len(system.parent)), dtype=bool)
-
-    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
-        return self.judge.outlook(system, expansions, guide)
-
-    def unresolved(self, system: Any, expansions: int) -> float:
-        return float(self.judge.unresolved(system, expansions))
-
-    def path(self, system: Any, guide: Any = None) -> Any:
-        return self.judge.path(system, guide)
-
-
-@dataclass(frozen=True)
-class Unplanned(Unclosed):
-    """A judge that takes for folding whatever passes the closure test."""
-
-    def stuck(self, system: Any) -> tuple[int, int]:
-        one, two = self.judge.stuck(system)
+        one, two = self.stuck_hinges(system).sum(axis=1)
         return int(one), int(two)
 
     def stuck_hinges(self, system: Any) -> Any:
         return self.judge.stuck_hinges(system)
 
     def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
-        from fabfold.fold.lattice import NO_GUIDE
-        from fabfold.tree.foldability import Outlook
-
-        return Outlook(np.zeros(len(system.parent), dtype=np.int32), NO_GUIDE)
+        return self.judge.outlook(system, expansions, guide)
 
     def unresolved(self, system: Any, expansions: int) -> float:
-        return 0.0
+        left = self.outlook(system, expansions).left
+        return float(left.sum()) / max(1, 2 * len(left))
+
+    def path(self, system: Any, guide: Any = None) -> Any:
+        return self.judge.path(system, guide)
 
 
-@dataclass(frozen=True)
-class Unjudged(Unplanned):
-    """A judge that takes everything for folding, until a path is asked for."""
-
-    def stuck(self, system: Any) -> tuple[int, int]:
-        return (0, 0)
+class Unclosed(Judge):
+    """Never asks the closure test."""
 
     def stuck_hinges(self, system: Any) -> Any:
         return np.zeros((2, len(system.parent)), dtype=bool)
+
+
+class Unguided(Judge):
+    """Plans every tree from nothing."""
+
+    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        return self.judge.outlook(system, expansions)
+
+
+class Unplanned(Judge):
+    """Takes for folding whatever passes the closure test, until a path is asked for."""
+
+    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        from fabfold.tree.foldability import Outlook
+
+        hinges = len(system.parent)
+        return Outlook(np.zeros(hinges, dtype=np.int32), np.zeros((0, 5), dtype=np.int32))
+
+
+class Unjudged(Unplanned, Unclosed):
+    """Takes everything for folding, until a path is asked for."""
 
 
 def changed(variant: str, voxels: Any) -> Any:
@@ -113,6 +112,8 @@ def changed(variant: str, voxels: Any) -> Any:
             effort = replace(effort, trees=1)
         elif variant == "no closure":
             judge = Unclosed(judge)
+        elif variant == "no guide":
+            judge = Unguided(judge)
         elif variant == "no planner":
             judge = Unplanned(judge)
         elif variant == "fold afterwards":
