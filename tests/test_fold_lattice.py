@@ -9,18 +9,21 @@ import numpy as np
 import pytest
 
 from fabfold.fold.foldability import LatticeFoldability, octants_of
-from fabfold.fold.lattice import closure, find_path, free_moves, refined
+from fabfold.fold.lattice import _ready, closure, find_path, free_moves, refined
+from fabfold.fold.mechanism import pose_scene
 from fabfold.fold.reference import (
     TOUCH,
     barrel_meetings,
     path_overlap,
     plate_meetings,
+    plates,
     poses,
     state_is_valid,
     stuck,
     turn_overlap,
 )
 from fabfold.fold.sweep import sweep_table
+from fabfold.fold.turns import turn_is_free
 from fabfold.lattice import FACES
 from fabfold.tree.system import HingeSystem
 
@@ -321,3 +324,69 @@ def test_no_hinges_means_nothing_to_fold():
     assert closure(system) == (0, 0)
     assert JUDGE.unresolved(system, 40) == 0.0
     assert JUDGE.path(system).shape == (0, 2)
+
+
+def double_hinge(cells, groups, joint, turns):
+    """Parent at 0, child at +x; axis edges as offsets in the face; bodies 0, link 1, child 2."""
+    points = [np.array([1, 0, 0]) + side for side in np.array(joint)]
+    lines = [np.cross([1, 0, 0], side) for side in np.array(joint)]
+    return HingeSystem(
+        np.array(cells, dtype=np.int32),
+        np.array(groups, dtype=np.int32),
+        np.array([0, 1], dtype=np.int32),
+        np.array(points, dtype=np.int32),
+        np.array([int(np.abs(line).argmax()) for line in lines], dtype=np.int8),
+        np.array([q * int(line.sum()) for q, line in zip(turns, lines, strict=True)], np.int8),
+    )
+
+
+def test_a_plate_cannot_swing_through_a_cell():
+    # The child turns away, then the link would pass through the cell beside the parent.
+    edges = [(0, 1, 0), (0, -1, 0)]
+    free = double_hinge([(0, 0, 0), (1, 0, 0)], [0, 2], edges, (2, 2))
+    assert JUDGE.path(free) is not None
+    for wall, folds in (((1, 1, 0), False), ((0, 1, 1), True)):
+        cells = [(0, 0, 0), (1, 0, 0), wall]
+        system = double_hinge(cells, [0, 2, 0], edges, (2, 2))
+        assert (JUDGE.path(system) is not None) == folds, wall
+        assert brute_force(system) == folds, wall
+
+
+def test_plates_meet_what_the_reference_says():
+    checked = met = 0
+    for seed in range(24):
+        system = with_links(random_system((3, 2, 1), 4, seed, 0), seed)
+        if len(plates(system)) == 0:
+            continue
+        rng = np.random.default_rng(seed)
+        for _ in range(4):
+            q = np.array([rng.integers(abs(t) + 1) * np.sign(t) for t in system.turns])
+            if not state_is_valid(system, q):
+                continue
+            for h, t in enumerate(system.turns.tolist()):
+                way = int(np.sign(t))
+                if abs(q[h] + way) > abs(t):
+                    continue
+                after = q.copy()
+                after[h] += way
+                seen = plate_meetings(system, q, h, way, 1.0)
+                free = (
+                    not seen
+                    and state_is_valid(system, after)
+                    and turn_overlap(system, q, h, way).max(initial=0) <= TOUCH
+                    and not barrel_meetings(system, q, h, way)
+                )
+                assert turn_free(system, q, h, way) == free, (seed, q, h, way, seen)
+                checked += 1
+                met += bool(seen)
+    assert checked > 50 and met >= 3
+
+
+def turn_free(system, quarters, hinge, way):
+    """Whether the kernels let a hinge make a step from a state."""
+    mech, at, table = _ready(system)
+    place = int(np.flatnonzero(mech.origin == hinge)[0])
+    steps = np.abs(quarters)[mech.origin].astype(np.int8)
+    assert pose_scene(mech, at, steps)
+    step = 1 if way * int(system.turns[hinge]) > 0 else -1
+    return bool(turn_is_free(mech, at, table, place, step))

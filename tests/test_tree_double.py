@@ -80,6 +80,8 @@ def test_every_way_makes_its_joint(face):
             moved = made @ np.append(FACES[face], 1.0)
             assert tuple(np.rint(moved[:3]).astype(int)) == joint.offset
             assert (np.rint(made[:3, :3]) == ROTATIONS[joint.rotation]).all()
+        if joint.kind == "D" and sum(map(abs, joint.offset)) == 1:
+            assert all(3 in (way[1], way[3]) and way[1] % 2 == way[3] % 2 for way in ways(joint))
     # All pairs of different edges, three turns each.
     assert total == 12 * 9
 
