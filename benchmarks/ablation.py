@@ -92,6 +92,9 @@ class Unplanned(Judge):
         hinges = len(system.parent)
         return Outlook(np.zeros(hinges, dtype=np.int32), np.zeros((0, 5), dtype=np.int32))
 
+    def path(self, system: Any, guide: Any = None) -> Any:
+        return self.judge.path(system)
+
 
 class Unjudged(Unplanned, Unclosed):
     """Takes everything for folding, until a path is asked for."""
