@@ -32,14 +32,24 @@ def say(**figures: Any) -> None:
     print(json.dumps({**figures, "megabytes": round(peak)}), flush=True)
 
 
-def do_voxelize(model: str, side: int, seed: int, folder: Path) -> None:
+def do_solid(model: str, folder: Path) -> None:
+    """In a process of its own too: CAD kernels and mesh repair take more memory than the rest."""
+    from fabfold.solid.load import load_solid
+    from fabfold.stagefiles import save_solid
+    from fabfold.store import StageStore
+
+    save_solid(StageStore(folder), load_solid(model))
+
+
+def do_voxelize(side: int, seed: int, folder: Path) -> None:
     from fabfold.lattice import load_template
     from fabfold.rounds import search_order
-    from fabfold.solid.load import load_solid
+    from fabfold.stagefiles import load_solid
+    from fabfold.store import StageStore
     from fabfold.voxels.search import voxelize
     from fabfold.voxels.store import save_voxels
 
-    solid = load_solid(model)
+    solid = load_solid(StageStore(folder), ["solid.npz"])
     voxelize(solid, load_template("box-3x3x3"), seed=seed, placements=2, shortlist=1, results=1)
     template = load_template(f"box-{side}x{side}x{side}")
     start = time.process_time()
@@ -213,8 +223,10 @@ def main() -> None:
     options = parser.parse_args()
     if options.stage:
         name, side = options.stage[0], int(options.stage[1])
-        if name == "voxelize":
-            do_voxelize(options.model, side, options.seed, options.folder)
+        if name == "solid":
+            do_solid(options.model, options.folder)
+        elif name == "voxelize":
+            do_voxelize(side, options.seed, options.folder)
         else:
             do_tree(side, options.seed, options.folder, options.budget)
         return
@@ -231,6 +243,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             common = ["--folder", folder, "--seed", str(options.seed), "--model", options.model]
             common += ["--budget", str(options.budget)]
+            measured(["--stage", "solid", "0", *common], 900)
             for side in options.sides:
                 row: dict[str, Any] = {"side": side}
                 row["voxelize"] = measured(["--stage", "voxelize", str(side), *common], 900)
