@@ -194,7 +194,7 @@ def table(data: dict[str, Any]) -> str:
         "",
         f"Written by `python benchmarks/growth.py`: {data['model']}, seed {data['seed']}, at most "
         f"{data['budget']:g} s for the tree. Seconds are CPU time of one core; memory is the peak "
-        " of the stage's own process, Python and libraries included.",
+        "of the stage's own process, Python and libraries included.",
         "",
         "| cells | voxels | voxelize | memory | first tree that fits | first tree that folds |"
         " memory |",
