@@ -25,8 +25,12 @@ class Effort:
         Candidates judged per start and voxel until the closure test passes (phase A).
     looking : int
         Looks of the planner per start and voxel until a tree folds (phase A).
+    gathering : int
+        Starts made in any case, so that the best of several trees that fold is polished.
+    trying : int
+        Candidates judged to lower the energy of each of these.
     polishing : int
-        Candidates judged after that to lower the energy (phase B).
+        The same for the best of them (phase B).
     least, most : int
         Voxels taken out at a time.
     rebeam : int
@@ -44,25 +48,27 @@ class Effort:
     """
 
     beam: int = 10
-    roots: int = 100
-    restarts: int = 30
+    roots: int = 1000
+    restarts: int = 200
     removals: int = 30000
-    closing: int = 20
-    looking: int = 3
-    polishing: int = 2500
+    closing: int = 8
+    looking: int = 1
+    gathering: int = 20
+    trying: int = 400
+    polishing: int = 4000
     least: int = 4
     most: int = 16
     rebeam: int = 6
     trees: int = 3
     glance: int = 40
-    look: int = 2500
-    near: float = 0.06
+    look: int = 100
+    near: float = 0.12
     keep: int = 5
 
 
 #: Effort by name, as the command line offers it.
 EFFORTS: dict[str, Effort] = {
-    "quick": Effort(restarts=10, polishing=300),
+    "quick": Effort(restarts=60, gathering=1, polishing=200),
     "normal": Effort(),
-    "thorough": Effort(restarts=100, polishing=10000),
+    "thorough": Effort(restarts=700, gathering=30, polishing=20000),
 }

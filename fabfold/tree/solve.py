@@ -195,7 +195,7 @@ class _Search:
         weight = np.full(len(problem.joints), self.scale.joint)
         weight[problem.tables.single + 1 :] *= double / single if single > 0 else 1.0
         weight[0] = 0.0
-        self.tables = problem.tables._replace(weight=weight)
+        self.softened = self.tables = problem.tables._replace(weight=weight)
         self.results: list[_State] = []
 
     # --- moves -----------------------------------------------------------------------------
@@ -344,31 +344,27 @@ class _Search:
                 now = fresh
         return now if now.penalty == 0 else None
 
-    def polish(self, start: _State) -> None:
-        """Phase B: anneal the energy among trees that the planner folds."""
-        self.tables = self.problem.tables
-        energy, _ = energy_of(self.tables, start.pose, self.problem.empty_face)
-        now = replace(start, energy=energy)
-        self.keep(now)
-        best = now.energy
-        steps = self.effort.polishing
+    def polish(self, start: _State, steps: int, hot: float, cold: float) -> _State:
+        """Phase B: anneal the energy among trees that the planner folds; returns the best."""
+        now = best = start
         for step in range(steps):
             if self.stopped():
                 break
-            heat = 0.1 * (0.005 / 0.1) ** (step / steps)
+            heat = hot * (cold / hot) ** (step / steps)
             value = now.energy + heat * self.rng.exponential()
             found = self.neighbour(now.pose, value, 20, 10.0)
             if found is None:
                 continue
-            assert now.tree is not None
             fresh = self.judged(found[0], found[1], now, 0.0)
             if fresh is None:
                 continue
             now = fresh
             self.statistics.folded += 1
-            if now.energy < best + 0.1:
-                best = min(best, now.energy)
+            if now.energy < best.energy + 0.1:
                 self.keep(now)
+            if now.energy < best.energy:
+                best = now
+        return best
 
     def keep(self, state: _State) -> None:
         """Remember a state that folds; tell of it where it is the best so far."""
@@ -386,24 +382,37 @@ class _Search:
             return None
         return Candidate(fold_tree(self.problem, state.pose, state.tree), path, self.seed)
 
+    def gather(self) -> list[_State]:
+        """Trees that fold, from several starts, each polished for a moment."""
+        effort, statistics = self.effort, self.statistics
+        found: list[_State] = []
+        for pose in grow(
+            self.problem, self.seed, beam=effort.beam, roots=effort.roots, stop=self.stopped
+        ):
+            statistics.grown += 1
+            self.tables = self.softened
+            start = self.hang_together(pose)
+            if start is not None:
+                statistics.starts += 1
+                folded = self.fold(start)
+                if folded is not None:
+                    self.tables = self.problem.tables
+                    energy, _ = energy_of(self.tables, folded.pose, self.problem.empty_face)
+                    folded = replace(folded, energy=energy)
+                    self.keep(folded)
+                    found.append(self.polish(folded, effort.trying, 0.1, 0.02))
+            enough = effort.gathering if found else effort.restarts
+            if statistics.starts >= enough or self.stopped():
+                break
+        return found
+
     def run(self) -> list[Candidate]:
         """All the phases."""
         effort = self.effort
-        grown = grow(
-            self.problem, self.seed, beam=effort.beam, roots=effort.roots, stop=self.stopped
-        )
-        for pose in grown:
-            self.statistics.grown += 1
-            start = self.hang_together(pose)
-            if start is None:
-                continue
-            self.statistics.starts += 1
-            folded = self.fold(start)
-            if folded is not None:
-                self.polish(folded)
-                break
-            if self.statistics.starts >= effort.restarts or self.stopped():
-                break
+        found = self.gather()
+        if found:
+            self.tables = self.problem.tables
+            self.polish(min(found, key=lambda s: s.energy), effort.polishing, 0.05, 0.005)
         if self.statistics.grown == 0:
             raise NoTreeError(
                 f"no tree found for {len(self.problem)} voxels in template "
