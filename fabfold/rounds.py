@@ -10,6 +10,7 @@ from typing import Any
 
 from fabfold.errors import NoFoldError, NoTreeError, RecipeError
 from fabfold.fold.closing import closed
+from fabfold.fold.cores import CORE
 from fabfold.fold.foldability import LatticeFoldability
 from fabfold.lattice import Template
 from fabfold.progress import Progress
@@ -337,7 +338,16 @@ class Rounds:
         problem = self.wishes.apply(problem, voxels, self.template)
         if self.template.creases:
             problem = parted(problem, self._seeds(number)[0], joints.depth)
-        return Job(problem, LatticeFoldability(), EFFORTS[self.recipe.effort])
+        return Job(problem, self._judge(number, voxels), EFFORTS[self.recipe.effort])
+
+    def _judge(self, number: int, voxels: Voxels) -> LatticeFoldability:
+        """Whole cells count at first; where they do not fold, every second round lets them be cut.
+
+        On large templates near misses are locked by more than corners: it would only cost time.
+        """
+        if number % 2 == 0 or len(self.template) > LARGE or self.template.creases:
+            return LatticeFoldability()
+        return LatticeFoldability(carve=CORE, material=voxels.subvoxels)
 
     def _round(self, number: int) -> list[Candidate]:
         if number in self._done:
