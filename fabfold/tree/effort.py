@@ -41,6 +41,8 @@ class Effort:
         Planner expansions without progress for a first score.
     look : int
         The same, where the first score leaves little to do.
+    strict_look : int
+        The same in phase B, along the steps of the tree that was changed.
     near : float
         Share of unresolved planner levels that still counts as little.
     keep : int
@@ -62,6 +64,7 @@ class Effort:
     trees: int = 3
     glance: int = 40
     look: int = 100
+    strict_look: int = 400
     near: float = 0.12
     keep: int = 5
 

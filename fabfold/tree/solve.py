@@ -262,14 +262,21 @@ class _Search:
 
     # --- judging ---------------------------------------------------------------------------
 
-    def outlook(self, tree: SpanningTree, guide: NDArray[np.int32] | None) -> Outlook:
-        """What the planner leaves, with a look without the guide where that is little."""
+    def outlook(self, tree: SpanningTree, guide: NDArray[np.int32] | None, strict: bool) -> Outlook:
+        """What the planner leaves, with a second look where that is little.
+
+        A tree that folds is changed a little at a time, so a long look along its steps finds most
+        that there is to find. Before anything folds, a look without them does more.
+        """
         self.statistics.glances += 1
         found = self.judge.outlook(tree.system, self.effort.glance, guide)
         left = found.left.sum()
         if 0 < left <= self.effort.near * 2 * len(found.left):
             self.statistics.looks += 1
-            other = self.judge.outlook(tree.system, self.effort.look)
+            if strict:
+                other = self.judge.outlook(tree.system, self.effort.strict_look, guide)
+            else:
+                other = self.judge.outlook(tree.system, self.effort.look)
             if other.left.sum() < left:
                 return other
         return found
@@ -295,7 +302,7 @@ class _Search:
             steps = guide
             if penalty == 0:
                 self.statistics.closed += 1
-                found = self.outlook(tree, guide)
+                found = self.outlook(tree, guide, bound == 0.0)
                 trouble = found.left > 0
                 penalty = self.scale.stuck * float(found.left.sum()) / max(1, 2 * len(trouble))
                 steps = found.guide
