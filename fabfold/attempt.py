@@ -1,15 +1,20 @@
-"""A tree on its way to being built: what the fold and join stages return."""
+"""A tree on its way to being built: what the fold and join stages return, and the way between."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from fabfold.fold.model import Motion
 from fabfold.joinery.model import Joinery
+from fabfold.progress import Progress
 from fabfold.tree.model import FoldTree
 from fabfold.voxels.model import Voxels
 
-__all__ = ["Attempt", "Made"]
+if TYPE_CHECKING:
+    from fabfold.printing.profiles import Profile
+
+__all__ = ["Attempt", "Made", "build"]
 
 
 @dataclass(frozen=True)
@@ -38,3 +43,54 @@ class Made:
     attempt: Attempt
     joinery: Joinery
     refused: tuple[str, ...]
+
+
+def build(
+    attempt: Attempt,
+    profile: Profile,
+    voxel_mm: float,
+    refused: tuple[str, ...],
+    progress: Progress,
+) -> Made:
+    """Make the bodies of a tree, and certify its path on them.
+
+    Parameters
+    ----------
+    attempt : Attempt
+    profile : Profile
+        Clearance of the hinges, and the gap to certify.
+    voxel_mm : float
+        Printed side of a voxel.
+    refused : tuple of str
+        Why each better-ranked tree was passed over.
+    progress : Progress
+
+    Raises
+    ------
+    GeometryError
+        If this tree cannot be built.
+    CheckError
+        If its bodies come too near to each other on the path.
+    """
+    from fabfold.fold.certify import certify
+    from fabfold.joinery.build import build_bodies
+
+    joinery = build_bodies(
+        attempt.voxels,
+        attempt.tree,
+        attempt.motion,
+        voxel_mm=voxel_mm,
+        clearance_mm=profile.clearance_mm,
+        progress=progress,
+    )
+    certificate = certify(
+        attempt.tree,
+        attempt.motion,
+        [(body.vertices, body.faces) for body in joinery.bodies],
+        voxel_mm=joinery.voxel_mm,
+        origin_mm=joinery.origin_mm,
+        min_gap_mm=profile.min_gap_mm,
+        progress=progress,
+    )
+    motion = replace(attempt.motion, certificate=certificate)
+    return Made(replace(attempt, motion=motion), joinery, refused)

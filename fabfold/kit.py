@@ -13,25 +13,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fabfold import __version__
-from fabfold.attempt import Attempt, Made
-from fabfold.errors import (
-    CheckError,
-    GeometryError,
-    KitError,
-    ModelError,
-    NoFoldError,
-    RecipeError,
-)
-from fabfold.files import sha256_of, write_bytes, write_text
-from fabfold.lattice import Template, rotation_about
+from fabfold import keys
+from fabfold.attempt import Attempt, Made, build
+from fabfold.errors import CheckError, GeometryError, KitError, NoFoldError, RecipeError
+from fabfold.files import write_text
+from fabfold.lattice import Template, rotation_of_degrees
+from fabfold.opening import check_free, start_of
 from fabfold.progress import Listener, Progress, SilentListener
-from fabfold.recipe import Recipe, make_recipe, read_recipe
-from fabfold.store import StageStore, stage_key
-from fabfold.targets import find_input, is_file_name, load_target, named_target
+from fabfold.recipe import Recipe
+from fabfold.store import StageStore
+from fabfold.targets import load_target
 
 if TYPE_CHECKING:
     from fabfold.joinery.model import Joinery
@@ -110,7 +101,7 @@ class Kit:
         if recipe.joints_inside:
             self._template = replace(self._template, joints="inside")
         if folder is not None:
-            _claim(folder)
+            check_free(folder)
 
     @classmethod
     def from_model(
@@ -157,18 +148,12 @@ class Kit:
             progress.update(None, self.recipe.model)
             source: str | Path = self.recipe.model
             if self._model is not None:
-                source = self._keep(self._model, self.recipe.sha256, "model")
+                source = self._store.keep(self._model, self.recipe.sha256, "model")
             solid = load.load_solid(source)
             progress.update(1.0, f"{len(solid.faces)} triangles")
             return solid
 
-        return self._stage(
-            "solid",
-            stage_key(__version__, self.recipe.model, self.recipe.sha256, "paint"),
-            make,
-            save_solid,
-            load_solid,
-        )
+        return self._stage("solid", keys.solid_key(self.recipe), make, save_solid, load_solid)
 
     def voxelize(self) -> list[Voxels]:
         """Voxelizations of the model, best first (paper section 3)."""
@@ -184,7 +169,7 @@ class Kit:
                 solid,
                 self._template,
                 seed=recipe.seed,
-                rotation=_rotation_matrix(recipe.rotation),
+                rotation=None if recipe.rotation is None else rotation_of_degrees(recipe.rotation),
                 origin=recipe.origin,
                 pitch=recipe.pitch,
                 drop_below=recipe.drop_below,
@@ -194,7 +179,8 @@ class Kit:
             progress.update(1.0, f"{len(found[0])} voxels")
             return found
 
-        return self._stage("voxelize", self._voxels_key(), make, save_options, load_options)
+        key = keys.voxels_key(recipe, self._template)
+        return self._stage("voxelize", key, make, save_options, load_options)
 
     def fit(self) -> list[Candidate]:
         """Trees that fold, best first (paper section 4), of the first round that finds any.
@@ -246,7 +232,8 @@ class Kit:
                 "smaller --clearance-mm"
             )
 
-        return self._stage("join", self._join_key(profile), make, save_made, load_made)
+        key = keys.join_key(self.recipe, self._template, profile, self._mark())
+        return self._stage("join", key, make, save_made, load_made)
 
     def check(self) -> list[Check]:
         """Checks of the printed bodies and the replay of the path, each with figure and limit."""
@@ -262,13 +249,8 @@ class Kit:
             progress.update(1.0, f"{len(checks) - len(bad)} of {len(checks)} passed")
             return checks
 
-        return self._stage(
-            "check",
-            stage_key(self._join_key(profile), "check"),
-            make,
-            save_checks,
-            load_checks,
-        )
+        key = keys.check_key(self.recipe, self._template, profile, self._mark())
+        return self._stage("check", key, make, save_checks, load_checks)
 
     def export(self, folder: str | Path | None = None) -> Path:
         """Write the files of the kit and return their folder.
@@ -288,7 +270,7 @@ class Kit:
         target = self.folder if folder is None else Path(folder)
         if target is None:
             raise KitError("where to? Give a folder to export to")
-        _claim(target)
+        check_free(target)
         profile = self.profile()
         made = self.join()
         checks = self.check()
@@ -299,7 +281,7 @@ class Kit:
             )  # fmt: skip
         if target != self.folder:
             if self._model is not None:
-                self._keep(self._model, self.recipe.sha256, "model", StageStore(target))
+                StageStore(target).keep(self._model, self.recipe.sha256, "model")
             self._keep_template(StageStore(target))
         return target
 
@@ -332,68 +314,36 @@ class Kit:
             profile = profile.model_copy(update={"clearance_mm": self.recipe.clearance_mm})
         return profile
 
-    def _keep(self, file: Path, sha256: str, where: str, store: StageStore | None = None) -> Path:
-        """Copy an input into a kit, so that ``kit.toml`` alone can make the kit again."""
-        store = store or self._store
-        if store.folder is None:
-            return file
-        kept = store.path(where) / file.name
-        if not (kept.is_file() and sha256_of(kept) == sha256):
-            write_bytes(kept, file.read_bytes())
-        return kept
-
-    def _keep_template(self, store: StageStore | None = None) -> None:
+    def _keep_template(self, store: StageStore) -> None:
         if self._template_file is not None:
-            self._keep(self._template_file, self.recipe.template_sha256, "template", store)
-
-    def _voxels_key(self) -> str:
-        recipe = self.recipe
-        return stage_key(
-            __version__,
-            recipe.sha256 or recipe.model,
-            self._template.content,
-            recipe.seed,
-            [recipe.rotation, recipe.origin, recipe.pitch, recipe.drop_below],
-            *([list(recipe.protect)] if recipe.protect else []),
-        )
-
-    def _join_key(self, profile: Profile) -> str:
-        from fabfold.wishes import wished
-
-        recipe = self.recipe
-        return stage_key(
-            self._voxels_key(),
-            [recipe.surface_weight, recipe.single_weight, recipe.effort, recipe.rounds],
-            *([["wished", *wished(recipe)], ["pick", recipe.pick]] if self._wishful else []),
-            recipe.voxel_mm,
-            profile.model_dump(mode="json"),
-            [] if recipe.pick else self._rounds().mark(),
-        )
+            store.keep(self._template_file, self.recipe.template_sha256, "template")
 
     def _rounds(self) -> Rounds:
-        from fabfold.rounds import Rounds
-
         if "rounds" not in self._results:
-            self._results["rounds"] = Rounds(
-                self.recipe,
-                self._template,
-                self.voxelize(),
-                key=self._voxels_key(),
-                store=self._store,
-                workers=self.workers,
-                listening=self._listening,
-                scheduler=self.scheduler,
-                seconds=self.seconds,
-                wishes=self.wishes(),
-            )
+            self._results["rounds"] = self._rounds_of(self.recipe, seconds=self.seconds)
         result: Rounds = self._results["rounds"]
         return result
 
-    @property
-    def _wishful(self) -> bool:
-        from fabfold.wishes import wished
+    def _rounds_of(self, recipe: Recipe, shift: int = 0, seconds: float | None = None) -> Rounds:
+        """Search of the kit's voxelizations for its recipe, or one with another preference."""
+        from fabfold.rounds import Rounds
 
-        return bool(wished(self.recipe) or self.recipe.pick)
+        return Rounds(
+            recipe,
+            self._template,
+            self.voxelize(),
+            key=keys.voxels_key(self.recipe, self._template),
+            store=self._store,
+            workers=self.workers,
+            listening=self._listening,
+            scheduler=self.scheduler,
+            seconds=seconds,
+            wishes=self.wishes(),
+            shift=shift,
+        )
+
+    def _mark(self) -> list[Any]:
+        return [] if self.recipe.pick else self._rounds().mark()
 
     def wishes(self) -> Wishes:
         """The wishes of the recipe, sampled on the model."""
@@ -406,19 +356,9 @@ class Kit:
 
     def granted(self, attempt: Attempt, joinery: Joinery | None = None) -> list[dict[str, Any]]:
         """What became of each wish in a tree and its bodies: figures and a line of text."""
-        from fabfold.wishes import printed_share
+        from fabfold.wishes import granted
 
-        wishes = self.wishes()
-        found = wishes.report(attempt.voxels, attempt.tree)
-        if joinery is not None:
-            entries = {entry["wish"]: entry for entry in found}
-            for region in wishes.regions:
-                points = np.concatenate(region.pieces)
-                share = printed_share(points, attempt.voxels, joinery)
-                entry = entries[f"protect {region.text}"]
-                entry["printed"] = round(share, 4)
-                entry["text"] += f"; grooves and gaps leave {share:.1%} of it"
-        return found
+        return granted(self.wishes(), attempt, joinery)
 
     def pareto(self) -> list[Solution]:
         """Trees that fold of which none is better than another in every respect.
@@ -431,28 +371,10 @@ class Kit:
             If no round of the recipe finds a tree that folds.
         """
         from fabfold.pareto import solutions
-        from fabfold.rounds import Rounds
 
         if "pareto" not in self._results:
-            recipe = self.recipe
-            options, key, wishes = self.voxelize(), self._voxels_key(), self.wishes()
-
-            def rounds_of(recipe: Recipe, shift: int) -> Rounds:
-                return Rounds(
-                    recipe,
-                    self._template,
-                    options,
-                    key=key,
-                    store=self._store,
-                    workers=self.workers,
-                    listening=self._listening,
-                    scheduler=self.scheduler,
-                    wishes=wishes,
-                    shift=shift,
-                )
-
             self._results["pareto"] = solutions(
-                recipe, rounds_of, self._listening, self.workers, self.scheduler
+                self.recipe, self._rounds_of, self._listening, self.workers, self.scheduler
             )
         result: list[Solution] = self._results["pareto"]
         return result
@@ -467,13 +389,9 @@ class Kit:
                 write_pareto(self.folder, found, progress)
 
     def _picked(self) -> Solution:
-        found = self.pareto()
-        if self.recipe.pick > len(found):
-            raise RecipeError(
-                f"--pick {self.recipe.pick}: the Pareto list has {len(found)} solutions; "
-                "'fabfold fit --pareto' shows them"
-            )
-        return found[self.recipe.pick - 1]
+        from fabfold.pareto import picked
+
+        return picked(self.pareto(), self.recipe.pick)
 
     def _attempts(self) -> Iterator[Attempt]:
         """Every candidate of every round, best first, with its lattice path as a motion."""
@@ -491,34 +409,13 @@ class Kit:
     def _build(
         self, attempt: Attempt, profile: Profile, refused: tuple[str, ...], progress: Progress
     ) -> Made:
-        from fabfold.fold.certify import certify
-        from fabfold.joinery.build import build_bodies
-
-        joinery = build_bodies(
-            attempt.voxels,
-            attempt.tree,
-            attempt.motion,
-            voxel_mm=self.recipe.voxel_mm,
-            clearance_mm=profile.clearance_mm,
-            progress=progress,
-        )
-        certificate = certify(
-            attempt.tree,
-            attempt.motion,
-            [(body.vertices, body.faces) for body in joinery.bodies],
-            voxel_mm=joinery.voxel_mm,
-            origin_mm=joinery.origin_mm,
-            min_gap_mm=profile.min_gap_mm,
-            progress=progress,
-        )
-        motion = replace(attempt.motion, certificate=certificate)
-        return Made(replace(attempt, motion=motion), joinery, refused)
+        return build(attempt, profile, self.recipe.voxel_mm, refused, progress)
 
     def _listening(self, name: str) -> AbstractContextManager[Progress]:
         """Progress of a stage that is about to be made; the recipe is written before the first."""
         if self.folder is not None:
             write_text(self.folder / "kit.toml", self.recipe.to_toml())
-            self._keep_template()
+            self._keep_template(self._store)
         return self.listener.stage(name)
 
     def _stage(
@@ -573,71 +470,13 @@ def open_kit(
     RecipeError
         If the recipe or an option is wrong.
     """
-    given = {key: value for key, value in options.items() if value is not None}
-    template: Path | None = None
-    if "template" in given:
-        fields, template = named_target(str(given["template"]))
-        given.update(fields)
-    path = Path(source)
-    if path.is_dir():
-        if not (path / "kit.toml").is_file():
-            raise KitError(f"{path}: a folder without kit.toml is no kit; give a model file")
-        path = path / "kit.toml"
-    model: Path | None = None
-    if path.suffix == ".toml":
-        folder = path.parent if folder is None else folder
-        recipe = read_recipe(path)
-        if template is None and "template" not in given and is_file_name(recipe.template):
-            template = find_input(recipe.template, recipe.template_sha256, path.parent, "template")
-            given.update(named_target(str(template))[0])
-        elif "template" in given and "template_cells" not in given:
-            given["template_cells"] = None
-        recipe = make_recipe(**{**recipe.model_dump(), **given})
-        if not recipe.model.startswith("sample:"):
-            model = find_input(recipe.model, recipe.sha256, path.parent, "model")
-    elif source.startswith("sample:"):
-        from fabfold.solid.samples import sample
-
-        given.setdefault("template", sample(source.removeprefix("sample:")).template)
-        recipe = make_recipe(model=source, **given)
-    else:
-        if not path.is_file():
-            raise ModelError(f"{source}: no such file (built-in samples are written sample:NAME)")
-        given.setdefault("template", "box-4x4x4")
-        recipe = make_recipe(model=path.name, sha256=sha256_of(path), **given)
-        model = path
+    start = start_of(source, folder, options)
     return Kit(
-        recipe,
-        model=model,
-        template=template,
-        folder=folder,
+        start.recipe,
+        model=start.model,
+        template=start.template,
+        folder=start.folder,
         workers=workers,
         scheduler=scheduler,
         seconds=seconds,
     )
-
-
-def _claim(folder: Path) -> None:
-    """Refuse a folder that holds something that is no kit."""
-    if folder.exists() and not folder.is_dir():
-        raise KitError(f"{folder}: is a file; give another folder for the kit")
-    if folder.is_dir():
-        names = {entry.name for entry in folder.iterdir()}
-        if names and not names & {"kit.toml", "stages"}:
-            raise KitError(
-                f"{folder}: holds files that are no kit; give another or an empty folder"
-            )
-
-
-def _rotation_matrix(
-    degrees: tuple[float, float, float] | None,
-) -> NDArray[np.float64] | None:
-    """Rotation about x, then y, then z of the fixed axes."""
-    if degrees is None:
-        return None
-    origin = np.zeros(3)
-    turns = [
-        rotation_about(origin, axis, angle)[:3, :3]
-        for axis, angle in zip(np.eye(3), degrees, strict=True)
-    ]
-    return turns[2] @ turns[1] @ turns[0]

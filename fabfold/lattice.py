@@ -29,6 +29,7 @@ __all__ = [
     "parity",
     "rotation_about",
     "rotation_index",
+    "rotation_of_degrees",
     "template_names",
 ]
 
@@ -54,6 +55,16 @@ def _proper_rotations() -> IntArray:
 
 #: The 24 proper rotations of the cube, shape (24, 3, 3); index 0 is the identity.
 ROTATIONS: IntArray = _proper_rotations()
+
+
+def rotation_of_degrees(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Rotation about x, then y, then z of the fixed axes, as a (3, 3) matrix."""
+    origin = np.zeros(3)
+    turns = [
+        rotation_about(origin, axis, angle)[:3, :3]
+        for axis, angle in zip(np.eye(3), degrees, strict=True)
+    ]
+    return turns[2] @ turns[1] @ turns[0]
 
 
 def rotation_index(matrix: NDArray[np.generic]) -> int:

@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fabfold.errors import NoFoldError, NoTreeError
+from fabfold.errors import NoFoldError, NoTreeError, RecipeError
 from fabfold.progress import Progress
 from fabfold.search import Budget, Tally, executor, run_seeds
 from fabfold.seeds import Event, Job
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fabfold.recipe import Recipe
     from fabfold.rounds import Rounds
 
-__all__ = ["LADDER", "Solution", "solutions", "undominated"]
+__all__ = ["LADDER", "Solution", "picked", "solutions", "undominated"]
 
 #: Steps of the knob between fewest hinges (0) and best surface (1).
 LADDER = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -141,6 +141,22 @@ def solutions(
         f"no tree that folds in {most} rounds of {len(LADDER)} preferences; try --effort thorough, "
         "more --rounds, another --seed or a larger template"
     )
+
+
+def picked(found: Sequence[Solution], number: int) -> Solution:
+    """Solution by its number, from 1.
+
+    Raises
+    ------
+    RecipeError
+        If there are fewer.
+    """
+    if number > len(found):
+        raise RecipeError(
+            f"--pick {number}: the Pareto list has {len(found)} solutions; "
+            "'fabfold fit --pareto' shows them"
+        )
+    return found[number - 1]
 
 
 def _round(

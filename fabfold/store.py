@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fabfold.errors import KitError
-from fabfold.files import sha256_of, write_json
+from fabfold.files import sha256_of, write_bytes, write_json
 
 __all__ = ["StageStore", "stage_key"]
 
@@ -63,6 +63,21 @@ class StageStore:
         if self.folder is None:
             raise KitError("this kit has no folder to keep stages in")
         return self.folder / name
+
+    def keep(self, file: Path, sha256: str, name: str) -> Path:
+        """Copy an input into folder `name` of the store, so that the recipe alone makes the kit.
+
+        Returns
+        -------
+        Path
+            The copy; `file` itself if this store keeps nothing.
+        """
+        if self.folder is None:
+            return file
+        kept = self.path(name) / file.name
+        if not (kept.is_file() and sha256_of(kept) == sha256):
+            write_bytes(kept, file.read_bytes())
+        return kept
 
     def files(self, stage: str) -> list[str]:
         """Names of the files that `stage` wrote, sorted."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.attempt import Attempt
 from fabfold.errors import RecipeError
 from fabfold.joinery.model import Joinery
 from fabfold.recipe import Recipe
@@ -23,7 +24,7 @@ from fabfold.voxels.regions import (
     to_lattice,
 )
 
-__all__ = ["make_wishes", "printed_share", "weights_of", "wished"]
+__all__ = ["granted", "make_wishes", "printed_share", "weights_of", "wished"]
 
 #: How far the knob between hinges and surface reaches: at its ends one weight is this many times
 #: greater, and the other as many times smaller.
@@ -98,6 +99,22 @@ def printed_share(points: NDArray[np.float64], voxels: Voxels, joinery: Joinery)
             grid = occupancy((body.vertices - low) / step, body.faces, (x, y, z))
             inside |= np.asarray(grid)[index]
     return float(inside.mean())
+
+
+def granted(
+    wishes: Wishes, attempt: Attempt, joinery: Joinery | None = None
+) -> list[dict[str, Any]]:
+    """What became of each wish in a tree and its bodies: figures and a line of text."""
+    found = wishes.report(attempt.voxels, attempt.tree)
+    if joinery is not None:
+        entries = {entry["wish"]: entry for entry in found}
+        for region in wishes.regions:
+            points = np.concatenate(region.pieces)
+            share = printed_share(points, attempt.voxels, joinery)
+            entry = entries[f"protect {region.text}"]
+            entry["printed"] = round(share, 4)
+            entry["text"] += f"; grooves and gaps leave {share:.1%} of it"
+    return found
 
 
 def wished(recipe: Recipe) -> list[Any]:
