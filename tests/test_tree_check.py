@@ -102,7 +102,7 @@ def test_hinge_fields(tree):
     found = check_tree(replace(tree, hinges=tree.hinges[:-1]))
     assert any("every hinge exactly once" in t for t in found)
     more = (*tree.bodies, Body("body-99", ()))
-    assert any("hinges for" in t for t in check_tree(replace(tree, bodies=more)))
+    assert any("what R edges join" in t for t in check_tree(replace(tree, bodies=more)))
 
 
 def test_bodies(tree):
