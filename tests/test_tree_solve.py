@@ -155,8 +155,10 @@ def test_full_template_of_125_cells_is_filled():
 def test_nothing_folds_without_budget(dog):
     class Stubborn(LatticeFoldability):
         def outlook(self, system, expansions, guide=None):
-            return super().outlook(system, 1)._replace(
-                left=np.ones(len(system.parent), dtype=np.int32)
+            return (
+                super()
+                .outlook(system, 1)
+                ._replace(left=np.ones(len(system.parent), dtype=np.int32))
             )
 
     with pytest.raises(NoFoldError, match="none of"):
