@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import mix, random_float
 
-__all__ = ["clusters", "doubles_needed", "energy_of", "fill_beam"]
+__all__ = [
+    "clash",
+    "clusters",
+    "doubles_needed",
+    "energy_of",
+    "fill_beam",
+    "occupy",
+    "seen_twice",
+]
 
 
 #: Price of a double hinge while growing. A voxel can hold one only, so where they are taken freely
@@ -65,6 +73,75 @@ def keeps_whole(tables: Tables, pose: NDArray[np.int32], v: int, q: int) -> bool
 
 
 @njit(cache=True)
+def clash(held: int, mask: NDArray[np.uint8], v: int, q: int) -> bool:
+    """Whether a cell of which the eighths `held` are taken has no room for `v` at pose `q`."""
+    return held == 255 or (held != 0 and (held & mask[v, q % 24]) != 0)
+
+
+@njit(cache=True)
+def occupy(taken: NDArray[np.uint8], mask: NDArray[np.uint8], v: int, q: int) -> int:
+    """Take the eighths of voxel `v` at pose `q`; two voxels take all of a cell.
+
+    Returns
+    -------
+    int
+        1 where the cell holds two voxels now, else 0.
+    """
+    if taken[q // 24] != 0:
+        taken[q // 24] = 255
+        return 1
+    taken[q // 24] = mask[v, q % 24]
+    return 0
+
+
+@njit(cache=True)
+def _close(taken: NDArray[np.uint8]) -> None:
+    """Let nothing more into cells that hold anything."""
+    for cell in range(len(taken)):
+        if taken[cell] != 0:
+            taken[cell] = 255
+
+
+@njit(cache=True)
+def seen_twice(tables: Tables, v: int, q: int, w: int, p: int) -> float:
+    """What counts twice when the costs of two voxels in one cell are added.
+
+    Of each quarter of a visible face the nearer material is seen, by the mean depth: that is exact
+    where only one of them has material behind the quarter, else a little more than the mean of the
+    nearer depths.
+
+    Parameters
+    ----------
+    tables : Tables
+    v, q, w, p : int
+        A voxel and its pose, and the other one's.
+
+    Returns
+    -------
+    float
+        Weighted energy to be taken off.
+    """
+    total = 0.0
+    for f in range(6):
+        if (tables.exposed[q // 24] >> f) & 1 == 0:
+            continue
+        for k in range(4):
+            total += max(
+                np.float64(tables.seen[v, q % 24, f, k]), np.float64(tables.seen[w, p % 24, f, k])
+            )
+    return total
+
+
+@njit(cache=True)
+def _saved(tables: Tables, pose: NDArray[np.int32], v: int, q: int) -> float:
+    """As :func:`seen_twice`, with whoever is in the cell."""
+    for w in range(len(pose)):
+        if w != v and pose[w] >= 0 and pose[w] // 24 == q // 24:
+            return seen_twice(tables, v, q, w, pose[w])
+    return 0.0
+
+
+@njit(cache=True)
 def doubles_needed(tables: Tables, pose: NDArray[np.int32]) -> int:
     """Fewest double hinges: the pieces, less one, that rigid joints and single hinges leave."""
     if tables.single + 1 >= tables.step.shape[1]:
@@ -100,7 +177,8 @@ def doubles_needed(tables: Tables, pose: NDArray[np.int32]) -> int:
 def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tuple[float, int]:
     """Weighted energy of a full set of poses and its number of rigid clusters.
 
-    Clusters that single hinges alone would leave apart cost the weight of a double hinge.
+    Clusters that single hinges alone would leave apart cost the weight of a double hinge. A
+    visible face of a cell with two voxels counts by its nearer material, see :func:`seen_twice`.
 
     Parameters
     ----------
@@ -109,7 +187,7 @@ def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tup
     """
     label = np.empty(len(pose), np.int32)
     found = clusters(tables, pose, label)
-    taken = np.zeros(len(tables.cells), np.bool_)
+    taken = np.full(len(tables.cells), -1, np.int32)
     total = tables.weight[1] * (found - 1)
     if tables.single + 1 < len(tables.weight):
         more = tables.weight[tables.single + 1] - tables.weight[1]
@@ -117,9 +195,12 @@ def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tup
     for v in range(len(pose)):
         if pose[v] >= 0:
             total += np.float64(tables.cost[v, pose[v]])
-            taken[pose[v] // 24] = True
+            w = taken[pose[v] // 24]
+            if w >= 0:
+                total -= seen_twice(tables, v, pose[v], w, pose[w])
+            taken[pose[v] // 24] = v
     for cell in range(len(taken)):
-        if not taken[cell]:
+        if taken[cell] < 0:
             for f in range(6):
                 if tables.around[cell, f] < 0:
                     total += empty_face
@@ -130,7 +211,7 @@ def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tup
 def _survey(
     tables: Tables,
     pose: NDArray[np.int32],
-    taken: NDArray[np.bool_],
+    taken: NDArray[np.uint8],
     todo: NDArray[np.int32],
     priority: NDArray[np.float64],
     mark: NDArray[np.int32],
@@ -142,11 +223,12 @@ def _survey(
     """Pick the most constrained voxel that can be placed next; -1 when the state is dead.
 
     A state is dead when a voxel has no place left, or when the free cells that the frontier can
-    reach are fewer than the voxels left. A lenient survey overlooks that, and returns -1 only
+    reach are fewer than the voxels left that need a whole one. A lenient survey overlooks that, and returns -1 only
     when nothing can be placed.
     """
     best = -1
     best_key = 1e18
+    mask = tables.mask
     whole = len(tables.stiff) > 0
     left = 0
     seeds = 0
@@ -155,7 +237,8 @@ def _survey(
         v = todo[k]
         if pose[v] >= 0:
             continue
-        left += 1
+        if mask[v, 0] == 255:
+            left += 1
         stamp[0] += 1
         found = 0
         placed = 0
@@ -176,7 +259,7 @@ def _survey(
                 if not tables.allowed[u, g, j]:
                     continue
                 q = tables.step[g, j, parent]
-                if q < 0 or taken[q // 24] or mark[q] == stamp[0]:
+                if q < 0 or mark[q] == stamp[0] or clash(taken[q // 24], mask, v, q):
                     continue
                 mark[q] = stamp[0]
                 if whole and not keeps_whole(tables, pose, v, q):
@@ -207,7 +290,7 @@ def _survey(
             head += 1
             for f in range(6):
                 other = tables.around[cell, f]
-                if other >= 0 and not taken[other] and reach[other] != stamp[1]:
+                if other >= 0 and taken[other] != 255 and reach[other] != stamp[1]:
                     reach[other] = stamp[1]
                     reach[len(taken) + seeds] = other
                     seeds += 1
@@ -293,7 +376,9 @@ def fill_beam(
     whole = len(tables.stiff) > 0
     pose = np.empty((2, width, count), np.int32)
     label = np.empty((2, width, count), np.int32)
-    taken = np.zeros((2, width, room), np.bool_)
+    mask = tables.mask
+    taken = np.zeros((2, width, room), np.uint8)
+    shared = np.zeros((2, width), np.int32)
     score = np.zeros((2, width))
     key = np.zeros((2, width), np.uint64)
     pick = np.empty((2, width), np.int32)
@@ -315,7 +400,9 @@ def fill_beam(
     clusters(tables, start, label[0, 0])
     for v in range(count):
         if start[v] >= 0:
-            taken[0, 0, start[v] // 24] = True
+            shared[0, 0] += occupy(taken[0, 0], mask, v, start[v])
+    if shared[0, 0] >= tables.shares:
+        _close(taken[0, 0])
     flood = len(todo) > 8 and not lenient
     pick[0, 0] = _survey(
         tables, pose[0, 0], taken[0, 0], todo, priority, mark, stamp, reach, flood, lenient
@@ -346,7 +433,9 @@ def fill_beam(
                     if not tables.allowed[u, g, j]:
                         continue
                     q = tables.step[g, j, here[u]]
-                    if q < 0 or taken[now, b, q // 24] or mark[q] == stamp[0]:
+                    if q < 0 or mark[q] == stamp[0]:
+                        continue
+                    if clash(taken[now, b, q // 24], mask, v, q):
                         continue
                     mark[q] = stamp[0]
                     if whole and not keeps_whole(tables, here, v, q):
@@ -359,6 +448,8 @@ def fill_beam(
                     delta += joint_share * tables.weight[1] * (1 - merged)
                     if f >= 6:
                         delta += SCARCE
+                    if taken[now, b, q // 24] != 0:
+                        delta -= _saved(tables, here, v, q)
                     from_state[options] = b
                     to_pose[options] = q
                     plain[options] = score[now, b] + delta
@@ -389,7 +480,11 @@ def fill_beam(
             pose[nxt, kept] = pose[now, b]
             taken[nxt, kept] = taken[now, b]
             pose[nxt, kept, v] = q
-            taken[nxt, kept, q // 24] = True
+            shared[nxt, kept] = shared[now, b]
+            if occupy(taken[nxt, kept], mask, v, q) != 0:
+                shared[nxt, kept] += 1
+                if shared[nxt, kept] == tables.shares:
+                    _close(taken[nxt, kept])
             if not last:
                 pick[nxt, kept] = _survey(
                     tables,

@@ -113,6 +113,25 @@ def _edge_in_template(
 
 
 @njit(cache=True)
+def _find_guests(tables: Tables, pose: NDArray[np.int32], guest: NDArray[np.bool_]) -> None:
+    """Mark the voxels that share their cell with another one."""
+    first = np.full(len(tables.cells), -1, np.int32)
+    for v in range(len(pose)):
+        other = first[pose[v] // 24]
+        if other >= 0:
+            guest[v] = True
+            guest[other] = True
+        first[pose[v] // 24] = v
+
+
+@njit(cache=True)
+def _has_edge(tables: Tables, v: int, face: int, side: int) -> bool:
+    """Whether the eighths of voxel `v` (rotation 0 is shape A) include those beside an edge."""
+    wanted = tables.beside[face, side]
+    return (tables.mask[v, 0] & wanted) == wanted
+
+
+@njit(cache=True)
 def candidates(  # noqa: PLR0912 - one row of the table after the other
     tables: Tables,
     pose: NDArray[np.int32],
@@ -122,7 +141,9 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
 ) -> tuple[int, int]:
     """Rigid clusters and the hinges that could join them.
 
-    Hinges whose turn would run the two clusters into each other are left out.
+    Hinges whose turn would run the two clusters into each other are left out. So are those of a
+    voxel that shares its cell, but for single hinges in its own eighths: knuckles and bracket need
+    the two beside the edge.
 
     Parameters
     ----------
@@ -154,6 +175,9 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
         member[at[label[v]]] = v
         at[label[v]] += 1
     plate = np.empty(3, np.int32)
+    guest = np.zeros(count, np.bool_)
+    if tables.shares > 0:
+        _find_guests(tables, pose, guest)
     rows = 0
     for u in range(count):
         for f in range(0, 6, 2):
@@ -162,6 +186,8 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
                 continue
             j = relation(tables, u, f, v, pose)
             if j < 1:
+                continue
+            if j > tables.single and (guest[u] or guest[v]):
                 continue
             a, b = label[u], label[v]
             ours = member[start[a] : start[a + 1]]
@@ -173,6 +199,11 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
                 turns = tables.way[w, 1]
                 double = tables.way[w, 2] >= 0
                 if not _hinge_allowed(tables, pose[u], d, n):
+                    continue
+                side = hinges.sides[f, tables.way[w, 0]]
+                if guest[u] and not _has_edge(tables, u, f, side):
+                    continue
+                if guest[v] and not _has_edge(tables, v, f ^ 1, side):
                     continue
                 if not double:
                     table = hinges.swept if turns == 2 else hinges.quarter
