@@ -485,6 +485,8 @@ def fill_beam(
                 shared[nxt, kept] += 1
                 if shared[nxt, kept] == tables.shares:
                     _close(taken[nxt, kept])
+            elif shared[nxt, kept] == tables.shares:
+                taken[nxt, kept, q // 24] = 255
             if not last:
                 pick[nxt, kept] = _survey(
                     tables,
