@@ -62,12 +62,13 @@ def turned(material, rotation):
 def some_material(count, seed=0):
     """Cells with random blocks of material that hang together, some of them ragged."""
     rng = np.random.default_rng(seed)
-    out = np.zeros((count, SIZE, SIZE, SIZE), dtype=bool)
-    for cell in out:
+    out = rng.random((count, SIZE, SIZE, SIZE)) < 0.9
+    for ragged in out:
         low = rng.integers(0, 12, 3)
         high = low + rng.integers(4, 20, 3)
-        cell[tuple(slice(a, b) for a, b in zip(low, high, strict=True))] = True
-        cell &= rng.random(cell.shape) < 0.9
+        box = np.zeros_like(ragged)
+        box[tuple(slice(a, b) for a, b in zip(low, high, strict=True))] = True
+        ragged[~box] = False
     return out
 
 

@@ -224,7 +224,7 @@ def _body(
     cut: Cut, model: manifold3d.Manifold, rounded: Carved, tally: Tally
 ) -> manifold3d.Manifold:
     """One body as one connected solid, lattice origin at zero."""
-    voxel_mm, size = cut.voxel_mm, cut.size
+    voxel_mm = cut.voxel_mm
     cells = cut.tree.source[list(cut.tree.bodies[cut.index].voxels)]
     room = _room(cut, cells, model, tally)
     own = cut.fitted.halves[cut.index]

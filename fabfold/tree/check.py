@@ -21,13 +21,13 @@ def check_tree(tree: FoldTree) -> list[str]:
     """Everything that is wrong with a tree, in words; an empty list when nothing is.
 
     Checked: distinct cells in A, and in B too but for pairs of voxels in different eighths of one
-    cell, whose hinges are single and lie in their own eighths; target cells in the template; the edges span the
-    voxels and join face neighbours; bodies are exactly the voxels that R edges join; hinges in
-    order, on the lattice edge of the face that their voxels share; turns of 90, 180 or 270
-    degrees that open the face; a double hinge joins parent, link plate and child in this order,
-    on two edges; no voxel has two double hinges; forward kinematics carries every voxel to its
-    target and orientation; no two hinges on one lattice edge segment and no two link plates on one
-    lattice face in A or in B.
+    cell, whose hinges are single and lie in their own eighths; target cells in the template; the
+    edges span the voxels and join face neighbours; bodies are exactly the voxels that R edges
+    join; hinges in order, on the lattice edge of the face that their voxels share; turns of 90,
+    180 or 270 degrees that open the face; a double hinge joins parent, link plate and child in
+    this order, on two edges; no voxel has two double hinges; forward kinematics carries every
+    voxel to its target and orientation; no two hinges on one lattice edge segment and no two link
+    plates on one lattice face in A or in B.
 
     Parameters
     ----------
@@ -47,9 +47,7 @@ def check_tree(tree: FoldTree) -> list[str]:
     found = _bodies(tree) or _hinges(tree)
     if found:
         return found
-    return (
-        _kinematics(tree) + _senses(tree) + _segments(tree) + _plates(tree) + _guests(tree)
-    )
+    return _kinematics(tree) + _senses(tree) + _segments(tree) + _plates(tree) + _guests(tree)
 
 
 def _shapes(tree: FoldTree) -> list[str]:

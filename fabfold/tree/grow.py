@@ -10,16 +10,9 @@ from numpy.typing import NDArray
 
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import mix, random_float
+from fabfold.tree.room import clash, close, occupy, saved, seen_twice
 
-__all__ = [
-    "clash",
-    "clusters",
-    "doubles_needed",
-    "energy_of",
-    "fill_beam",
-    "occupy",
-    "seen_twice",
-]
+__all__ = ["clusters", "doubles_needed", "energy_of", "fill_beam"]
 
 
 #: Price of a double hinge while growing. A voxel can hold one only, so where they are taken freely
@@ -70,75 +63,6 @@ def keeps_whole(tables: Tables, pose: NDArray[np.int32], v: int, q: int) -> bool
             if parent >= 0 and tables.step[f ^ 1, 0, parent] != q:
                 return False
     return True
-
-
-@njit(cache=True)
-def clash(held: int, mask: NDArray[np.uint8], v: int, q: int) -> bool:
-    """Whether a cell of which the eighths `held` are taken has no room for `v` at pose `q`."""
-    return held == 255 or (held != 0 and (held & mask[v, q % 24]) != 0)
-
-
-@njit(cache=True)
-def occupy(taken: NDArray[np.uint8], mask: NDArray[np.uint8], v: int, q: int) -> int:
-    """Take the eighths of voxel `v` at pose `q`; two voxels take all of a cell.
-
-    Returns
-    -------
-    int
-        1 where the cell holds two voxels now, else 0.
-    """
-    if taken[q // 24] != 0:
-        taken[q // 24] = 255
-        return 1
-    taken[q // 24] = mask[v, q % 24]
-    return 0
-
-
-@njit(cache=True)
-def _close(taken: NDArray[np.uint8]) -> None:
-    """Let nothing more into cells that hold anything."""
-    for cell in range(len(taken)):
-        if taken[cell] != 0:
-            taken[cell] = 255
-
-
-@njit(cache=True)
-def seen_twice(tables: Tables, v: int, q: int, w: int, p: int) -> float:
-    """What counts twice when the costs of two voxels in one cell are added.
-
-    Of each quarter of a visible face the nearer material is seen, by the mean depth: that is exact
-    where only one of them has material behind the quarter, else a little more than the mean of the
-    nearer depths.
-
-    Parameters
-    ----------
-    tables : Tables
-    v, q, w, p : int
-        A voxel and its pose, and the other one's.
-
-    Returns
-    -------
-    float
-        Weighted energy to be taken off.
-    """
-    total = 0.0
-    for f in range(6):
-        if (tables.exposed[q // 24] >> f) & 1 == 0:
-            continue
-        for k in range(4):
-            total += max(
-                np.float64(tables.seen[v, q % 24, f, k]), np.float64(tables.seen[w, p % 24, f, k])
-            )
-    return total
-
-
-@njit(cache=True)
-def _saved(tables: Tables, pose: NDArray[np.int32], v: int, q: int) -> float:
-    """As :func:`seen_twice`, with whoever is in the cell."""
-    for w in range(len(pose)):
-        if w != v and pose[w] >= 0 and pose[w] // 24 == q // 24:
-            return seen_twice(tables, v, q, w, pose[w])
-    return 0.0
 
 
 @njit(cache=True)
@@ -223,8 +147,8 @@ def _survey(
     """Pick the most constrained voxel that can be placed next; -1 when the state is dead.
 
     A state is dead when a voxel has no place left, or when the free cells that the frontier can
-    reach are fewer than the voxels left that need a whole one. A lenient survey overlooks that, and returns -1 only
-    when nothing can be placed.
+    reach are fewer than the voxels left that need a whole one. A lenient survey overlooks that, and
+    returns -1 only when nothing can be placed.
     """
     best = -1
     best_key = 1e18
@@ -402,7 +326,7 @@ def fill_beam(
         if start[v] >= 0:
             shared[0, 0] += occupy(taken[0, 0], mask, v, start[v])
     if shared[0, 0] >= tables.shares:
-        _close(taken[0, 0])
+        close(taken[0, 0])
     flood = len(todo) > 8 and not lenient
     pick[0, 0] = _survey(
         tables, pose[0, 0], taken[0, 0], todo, priority, mark, stamp, reach, flood, lenient
@@ -449,7 +373,7 @@ def fill_beam(
                     if f >= 6:
                         delta += SCARCE
                     if taken[now, b, q // 24] != 0:
-                        delta -= _saved(tables, here, v, q)
+                        delta -= saved(tables, here, v, q)
                     from_state[options] = b
                     to_pose[options] = q
                     plain[options] = score[now, b] + delta
@@ -484,7 +408,7 @@ def fill_beam(
             if occupy(taken[nxt, kept], mask, v, q) != 0:
                 shared[nxt, kept] += 1
                 if shared[nxt, kept] == tables.shares:
-                    _close(taken[nxt, kept])
+                    close(taken[nxt, kept])
             elif shared[nxt, kept] == tables.shares:
                 taken[nxt, kept, q // 24] = 255
             if not last:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fabfold.tree.grow import clusters
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_float
+from fabfold.tree.room import find_guests
 from fabfold.tree.wedge import HingeTables, blocked, double_blocked
 
 __all__ = [
@@ -113,26 +114,24 @@ def _edge_in_template(
 
 
 @njit(cache=True)
-def _find_guests(tables: Tables, pose: NDArray[np.int32], guest: NDArray[np.bool_]) -> None:
-    """Mark the voxels that share their cell with another one."""
-    first = np.full(len(tables.cells), -1, np.int32)
-    for v in range(len(pose)):
-        other = first[pose[v] // 24]
-        if other >= 0:
-            guest[v] = True
-            guest[other] = True
-        first[pose[v] // 24] = v
+def _hinge_fits(
+    tables: Tables, guest: NDArray[np.bool_], u: int, v: int, f: int, side: int, double: bool
+) -> bool:
+    """Whether a hinge leaves alone what its voxels share: see :func:`candidates`."""
+    if not guest[u] and not guest[v]:
+        return True
+    if double:
+        return False
+    # Rotation 0 is shape A.
+    first = tables.beside[f, side]
+    second = tables.beside[f ^ 1, side]
+    if guest[u] and (tables.mask[u, 0] & first) != first:
+        return False
+    return not guest[v] or (tables.mask[v, 0] & second) == second
 
 
 @njit(cache=True)
-def _has_edge(tables: Tables, v: int, face: int, side: int) -> bool:
-    """Whether the eighths of voxel `v` (rotation 0 is shape A) include those beside an edge."""
-    wanted = tables.beside[face, side]
-    return (tables.mask[v, 0] & wanted) == wanted
-
-
-@njit(cache=True)
-def candidates(  # noqa: PLR0912 - one row of the table after the other
+def candidates(  # noqa: PLR0912, PLR0915 - one row of the table after the other
     tables: Tables,
     pose: NDArray[np.int32],
     hinges: HingeTables,
@@ -176,8 +175,9 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
         at[label[v]] += 1
     plate = np.empty(3, np.int32)
     guest = np.zeros(count, np.bool_)
-    if tables.shares > 0:
-        _find_guests(tables, pose, guest)
+    sharing = tables.shares > 0
+    if sharing:
+        find_guests(tables, pose, guest)
     rows = 0
     for u in range(count):
         for f in range(0, 6, 2):
@@ -186,8 +186,6 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
                 continue
             j = relation(tables, u, f, v, pose)
             if j < 1:
-                continue
-            if j > tables.single and (guest[u] or guest[v]):
                 continue
             a, b = label[u], label[v]
             ours = member[start[a] : start[a + 1]]
@@ -201,9 +199,7 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
                 if not _hinge_allowed(tables, pose[u], d, n):
                     continue
                 side = hinges.sides[f, tables.way[w, 0]]
-                if guest[u] and not _has_edge(tables, u, f, side):
-                    continue
-                if guest[v] and not _has_edge(tables, v, f ^ 1, side):
+                if sharing and not _hinge_fits(tables, guest, u, v, f, side, double):
                     continue
                 if not double:
                     table = hinges.swept if turns == 2 else hinges.quarter

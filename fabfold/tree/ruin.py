@@ -12,30 +12,10 @@ from fabfold.tree.grow import clusters, energy_of, fill_beam
 from fabfold.tree.problem import Tables
 from fabfold.tree.rebuild import COLUMNS, apart, candidates, hinge_rows, loose_pieces
 from fabfold.tree.rng import random_below, random_float
+from fabfold.tree.room import holders, one_of
 from fabfold.tree.wedge import HingeTables
 
-__all__ = ["holders", "propose", "repair", "ruin"]
-
-
-@njit(cache=True)
-def holders(tables: Tables, pose: NDArray[np.int32], out: NDArray[np.int32]) -> None:
-    """Fill `out` (m, 2) with the voxels in each template cell, -1 for none."""
-    out[:] = -1
-    for v in range(len(pose)):
-        if pose[v] >= 0:
-            cell = pose[v] // 24
-            if out[cell, 0] < 0:
-                out[cell, 0] = v
-            else:
-                out[cell, 1] = v
-
-
-@njit(cache=True)
-def _one_of(holder: NDArray[np.int32], cell: int, generator: NDArray[np.uint64]) -> int:
-    """A voxel in a cell, either where there are two; -1 for none."""
-    if holder[cell, 1] >= 0 and random_float(generator) < 0.5:
-        return holder[cell, 1]
-    return holder[cell, 0]
+__all__ = ["propose", "repair", "ruin"]
 
 
 @njit(cache=True)
@@ -98,20 +78,17 @@ def ruin(
                 q = tables.step[f, 0, pose[u]]
                 if q < 0:
                     continue
-                sitting = holder[q // 24, 0]
-                if sitting >= 0 and label[sitting] == here:
+                sitting = holder[q // 24]
+                if sitting[0] >= 0 and label[sitting[0]] == here:
                     continue
-                second = holder[q // 24, 1]
-                if second >= 0 and label[second] == here:
+                if sitting[1] >= 0 and label[sitting[1]] == here:
                     continue
                 out[v] = True
                 chosen += 1
-                if sitting >= 0 and not out[sitting]:
-                    out[sitting] = True
-                    chosen += 1
-                if second >= 0 and not out[second]:
-                    out[second] = True
-                    chosen += 1
+                for w in sitting:
+                    if w >= 0 and not out[w]:
+                        out[w] = True
+                        chosen += 1
                 if chosen >= want:
                     return chosen
         # The rest comes from the edges of what is already out.
@@ -134,7 +111,7 @@ def ruin(
         f = random_below(generator, 6)
         if in_template:
             cell = tables.around[pose[u] // 24, f]
-            v = _one_of(holder, cell, generator) if cell >= 0 else -1
+            v = one_of(holder, cell, generator) if cell >= 0 else -1
         else:
             v = tables.neighbour[u, f]
         if v >= 0 and not out[v]:
@@ -307,7 +284,7 @@ def _patch(
         for f in range(6):
             other = tables.around[cell, f]
             if other >= 0 and holder[other, 0] >= 0 and random_float(generator) < 0.6:
-                v = _one_of(holder, other, generator)
+                v = one_of(holder, other, generator)
                 if not out[v]:
                     out[v] = True
                     edge[size] = v
@@ -324,7 +301,7 @@ def _patch(
         v = tables.neighbour[u, f]
         if pose[u] >= 0 and random_float(generator) < 0.5:
             cell = tables.around[pose[u] // 24, f]
-            v = _one_of(holder, cell, generator) if cell >= 0 else -1
+            v = one_of(holder, cell, generator) if cell >= 0 else -1
         if v >= 0 and not out[v] and pose[v] >= 0:
             out[v] = True
             edge[size] = v

@@ -159,9 +159,7 @@ def seen_depths(subvoxels: NDArray[np.bool_], weight: float) -> NDArray[np.float
     return np.ascontiguousarray(0.25 * weight * out, dtype=np.float32)
 
 
-def shared_octants(
-    pose: NDArray[np.int32], masks: NDArray[np.uint8]
-) -> NDArray[np.uint8] | None:
+def shared_octants(pose: NDArray[np.int32], masks: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
     """The eighths that count of each voxel, once it is known which voxels share.
 
     Parameters
