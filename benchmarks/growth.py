@@ -71,11 +71,13 @@ def do_tree(side: int, seed: int, folder: Path, budget: float) -> None:
     from fabfold.errors import FabfoldError
     from fabfold.fold.foldability import LatticeFoldability
     from fabfold.lattice import load_template
+    from fabfold.seeds import run_seed
     from fabfold.tree.effort import Effort
     from fabfold.tree.problem import from_features
     from fabfold.tree.solve import Candidate, grow, solve
     from fabfold.voxels.features import features
     from fabfold.voxels.store import load_voxels
+    from fabfold.warming import strip_job
 
     template = load_template(f"box-{side}x{side}x{side}")
     voxels = load_voxels(folder / f"{side}.npz")
@@ -102,8 +104,7 @@ def do_tree(side: int, seed: int, folder: Path, budget: float) -> None:
 
     best: list[Any] = [None, None]
     first_tree = 0.0
-    # A strip of 8 in 2 x 2 x 2 calls every kernel once.
-    warm_up(LatticeFoldability(), Effort(polishing=5))
+    run_seed(strip_job(), 0, lambda _: None, lambda: False)
     start = time.process_time()
     problem = from_features(voxels, features(voxels), template)
     next(grow(problem, seed))
@@ -130,26 +131,6 @@ def do_tree(side: int, seed: int, folder: Path, budget: float) -> None:
             hinges=len(found[0].tree.hinges),
             moves=len(found[0].path),
         )
-
-
-def warm_up(judge: Any, effort: Any) -> None:
-    import numpy as np
-
-    from fabfold.lattice import load_template
-    from fabfold.tree.problem import tree_problem
-    from fabfold.tree.solve import solve
-
-    cells = np.array([(i, 0, 0) for i in range(8)], dtype=np.int32)
-    pairs = np.array([(i, i + 1) for i in range(7)], dtype=np.int32)
-    strip = tree_problem(
-        cells,
-        load_template("box-2x2x2"),
-        pairs=pairs,
-        rigid=np.ones(7, dtype=bool),
-        hinge=np.ones((7, 4), dtype=bool),
-        depth=np.zeros((8, 6)),
-    )
-    solve(strip, 0, judge, effort)
 
 
 def measured(arguments: list[str], limit: float) -> dict[str, Any]:
