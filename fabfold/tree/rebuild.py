@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.tree.grow import clusters
+from fabfold.tree.grow import clusters, pieces
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_float
 from fabfold.tree.wedge import HingeTables, blocked, double_blocked
@@ -44,31 +44,11 @@ def apart(tables: Tables, pose: NDArray[np.int32]) -> int:
 
     Zero for a full set of poses that some tree joins.
     """
-    count = len(pose)
-    seen = np.zeros(count, np.bool_)
-    stack = np.empty(count, np.int32)
-    total = -1
-    for first in range(count):
-        if seen[first]:
-            continue
-        seen[first] = True
-        total += 1
-        if pose[first] < 0:
-            continue
-        stack[0] = first
-        top = 1
-        while top > 0:
-            top -= 1
-            u = stack[top]
-            for f in range(6):
-                v = tables.neighbour[u, f]
-                if v < 0 or seen[v] or pose[v] < 0:
-                    continue
-                if relation(tables, u, f, v, pose) >= 0:
-                    seen[v] = True
-                    stack[top] = v
-                    top += 1
-    return total
+    left = pieces(tables, pose, tables.step.shape[1] - 1, np.empty(len(pose), np.int32))
+    for v in range(len(pose)):
+        if pose[v] < 0:
+            left += 1
+    return left - 1
 
 
 @njit(cache=True)
