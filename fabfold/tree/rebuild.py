@@ -52,20 +52,6 @@ def apart(tables: Tables, pose: NDArray[np.int32]) -> int:
 
 
 @njit(cache=True)
-def _hinge_allowed(tables: Tables, q: int, d: NDArray[np.int32], n: NDArray[np.int32]) -> bool:
-    """Whether a hinge on side n of face d of the voxel at pose q may lie there in the template."""
-    if tables.hinged.shape[0] == 0:
-        return True
-    rotation = tables.rotations[q % 24]
-    at = np.empty(3, np.int32)
-    for x in range(3):
-        at[x] = 2 * tables.cells[q // 24, x] + 1
-        for y in range(3):
-            at[x] += rotation[x, y] * (d[y] + n[y])
-    return tables.hinged[at[0], at[1], at[2]]
-
-
-@njit(cache=True)
 def hinge_rows(tables: Tables) -> int:
     """Most rows that :func:`candidates` can fill."""
     most = 1
@@ -93,6 +79,28 @@ def _edge_in_template(
 
 
 @njit(cache=True)
+def _resting_edge(
+    tables: Tables,
+    q: int,
+    d: NDArray[np.int32],
+    n: NDArray[np.int32],
+    out: NDArray[np.int32],
+) -> bool:
+    """The edge on side n of face d of the voxel at pose q; whether a hinge may lie there.
+
+    `out` gets its middle in B, doubled; where the template folds once more, a number for the edge
+    on which it ends.
+    """
+    _edge_in_template(tables, q, d, n, out)
+    if tables.hinged.shape[0] == 0:
+        return True
+    out[0] = tables.hinged[out[0] + 1, out[1] + 1, out[2] + 1]
+    out[1] = 0
+    out[2] = 0
+    return out[0] >= 0
+
+
+@njit(cache=True)
 def candidates(  # noqa: PLR0912 - one row of the table after the other
     tables: Tables,
     pose: NDArray[np.int32],
@@ -113,7 +121,8 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
         Filled with the cluster of each voxel.
     found : (:func:`hinge_rows`, 24) int32 array
         Filled with one row a hinge: 0, 1 voxels u and v; 2, 3 their clusters; 4 face of u; 5 joint
-        type; 6 to 8 twice the middle of its lattice edge in A, 9 to 11 in B; 12 its row of
+        type; 6 to 8 twice the middle of its lattice edge in A, 9 to 11 in B (or the number in
+        ``Tables.hinged``, and zeros); 12 its row of
         ``Tables.way``; 13 whether it is double, and if so, 14 to 19 the edge of the second axis in
         A and B, and 20 to 22 twice the middle of the link plate in B.
 
@@ -134,6 +143,8 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
         member[at[label[v]]] = v
         at[label[v]] += 1
     plate = np.empty(3, np.int32)
+    first = np.empty(3, np.int32)
+    second = np.empty(3, np.int32)
     rows = 0
     for u in range(count):
         for f in range(0, 6, 2):
@@ -152,7 +163,7 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
                 n = hinges.faces[hinges.sides[f, tables.way[w, 0]]]
                 turns = tables.way[w, 1]
                 double = tables.way[w, 2] >= 0
-                if not _hinge_allowed(tables, pose[u], d, n):
+                if not _resting_edge(tables, pose[u], d, n, first):
                     continue
                 if not double:
                     table = hinges.swept if turns == 2 else hinges.quarter
@@ -160,7 +171,7 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
                         continue
                 else:
                     m = hinges.faces[hinges.sides[f, tables.way[w, 2]]]
-                    if not _hinge_allowed(tables, pose[v], back, m):
+                    if not _resting_edge(tables, pose[v], back, m, second):
                         continue
                     if double_blocked(
                         tables.source,
@@ -186,13 +197,13 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
                 row[13] = double
                 for x in range(3):
                     row[6 + x] = 2 * tables.source[u, x] + d[x] + n[x]
-                _edge_in_template(tables, pose[u], d, n, row[9:12])
+                    row[9 + x] = first[x]
                 if double:
                     for x in range(3):
                         row[14 + x] = 2 * tables.source[u, x] + d[x] + m[x]
+                        row[17 + x] = second[x]
                         # The plate reaches from its first axis along -n, d, n, -d by turns.
                         plate[x] = n[x] + (n[x] if turns == 2 else (2 - turns) * d[x])
-                    _edge_in_template(tables, pose[v], back, m, row[17:20])
                     _edge_in_template(tables, pose[u], d, plate, row[20:23])
                 rows += 1
     return total, rows
@@ -213,7 +224,7 @@ def _alike(row: NDArray[np.int32], a: int, other: NDArray[np.int32], b: int) -> 
 
 @njit(cache=True)
 def _clash(row: NDArray[np.int32], other: NDArray[np.int32]) -> bool:
-    """Whether two hinges want one lattice edge in A or in B, one plate's face or one voxel."""
+    """Whether two hinges want one lattice edge in A or in the end, one plate's face, one voxel."""
     if _alike(row, 6, other, 6) or _alike(row, 9, other, 9):
         return True
     if row[13] != 0 and (_alike(row, 14, other, 6) or _alike(row, 17, other, 9)):
@@ -246,8 +257,8 @@ def spanning_tree(
 ) -> int:
     """Random spanning tree of the clusters.
 
-    No two of its hinges share a lattice edge segment in A or in B, and no voxel has two double
-    hinges (paper section 4.1, joint collision). Single hinges are preferred.
+    No two of its hinges share a lattice edge segment in A or in the end, and no voxel has two
+    double hinges (paper section 4.1, joint collision). Single hinges are preferred.
 
     Parameters
     ----------
