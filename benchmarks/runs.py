@@ -151,8 +151,8 @@ def recipe_of(kit: Any, seed: int, joints: str | None) -> Any:
     return type(kit.recipe)(**fields)
 
 
-def rounds_of(kit: Any, recipe: Any) -> Any:
-    """Rounds of seeds over the kit's voxelizations for another recipe."""
+def rounds_of(kit: Any, recipe: Any, options: Sequence[Any] | None = None) -> Any:
+    """Rounds of seeds over the kit's voxelizations, or over some of them, for another recipe."""
     from fabfold.progress import SilentListener
     from fabfold.rounds import Rounds
     from fabfold.store import StageStore
@@ -160,7 +160,7 @@ def rounds_of(kit: Any, recipe: Any) -> Any:
     return Rounds(
         recipe,
         kit.template,
-        kit.voxelize(),
+        kit.voxelize() if options is None else options,
         key="",
         store=StageStore(None),
         workers=1,
