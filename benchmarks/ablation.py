@@ -17,14 +17,14 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
 import runs
-from runs import HERE, MODELS
+from runs import HERE, MODELS, Judge
 
 #: The whole product, and what the other variants are compared with.
 PRODUCT, BASE = "several sizes", "full templates"
@@ -50,30 +50,6 @@ GROWTH = {
     "breadth first + insertion": "a fixed breadth-first order of the voxels",
     "breadth first": "the same, without insertion",
 }
-
-
-@dataclass(frozen=True)
-class Judge:
-    """The product's judge of folding, for others to leave something out."""
-
-    judge: Any
-
-    def stuck(self, system: Any) -> tuple[int, int]:
-        one, two = self.stuck_hinges(system).sum(axis=1)
-        return int(one), int(two)
-
-    def stuck_hinges(self, system: Any) -> Any:
-        return self.judge.stuck_hinges(system)
-
-    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
-        return self.judge.outlook(system, expansions, guide)
-
-    def unresolved(self, system: Any, expansions: int) -> float:
-        left = self.outlook(system, expansions).left
-        return float(left.sum()) / max(1, 2 * len(left))
-
-    def path(self, system: Any, guide: Any = None) -> Any:
-        return self.judge.path(system, guide)
 
 
 class Unclosed(Judge):

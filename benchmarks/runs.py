@@ -181,6 +181,30 @@ def warm_up(job: Any, joints: Any) -> float:
     return time.process_time() - start
 
 
+class Judge:
+    """The product's judge of folding, for others to leave something out or to look on."""
+
+    def __init__(self, judge: Any) -> None:
+        self.judge = judge
+
+    def stuck(self, system: Any) -> tuple[int, int]:
+        one, two = self.stuck_hinges(system).sum(axis=1)
+        return int(one), int(two)
+
+    def stuck_hinges(self, system: Any) -> Any:
+        return self.judge.stuck_hinges(system)
+
+    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        return self.judge.outlook(system, expansions, guide)
+
+    def unresolved(self, system: Any, expansions: int) -> float:
+        left = self.outlook(system, expansions).left
+        return float(left.sum()) / max(1, 2 * len(left))
+
+    def path(self, system: Any, guide: Any = None) -> Any:
+        return self.judge.path(system, guide)
+
+
 class Recorder:
     """Writes down when better trees come, on a clock of processor seconds."""
 
