@@ -112,7 +112,7 @@ def do_tree(
     from fabfold.seeds import Job, run_seed
     from fabfold.stagefiles import load_options
     from fabfold.store import StageStore
-    from fabfold.tree.solve import grow
+    from fabfold.tree.starts import grow
     from fabfold.warming import strip_job
 
     kit = Kit.from_model(model, template=name_of(side), seed=seed)

@@ -21,7 +21,8 @@ from fabfold.tree.build import hinge_choice
 from fabfold.tree.check import check_tree
 from fabfold.tree.effort import Effort
 from fabfold.tree.parts import parted
-from fabfold.tree.solve import grow, solve
+from fabfold.tree.solve import solve
+from fabfold.tree.starts import grow
 from fabfold.tree.system import HingeSystem, hinge_system
 from fabfold.voxels.target import template_of_solid
 
