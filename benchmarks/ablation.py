@@ -1,11 +1,13 @@
 """What each part of the search brings: writes benchmarks/ablation.md and .json.
 
-    python benchmarks/ablation.py [--models bunny kitten] [--seeds 1 2 3 4 5] [--seconds 20]
+    python benchmarks/ablation.py [--models bunny kitten] [--seeds 1 2 3] [--seconds 12]
         [--parts closure octants ...] [--work DIR] [--only-table]
 
-Each variant leaves one part of the product's search out (or puts one in), and runs the same seeds
-on the same voxels for the same seconds of one core. Growth is looked at by itself: how many of the
-same root poses end with every voxel in its place.
+The product's seeds take voxelizations of several sizes in turn, and roomy ones fold at once,
+whatever is left out. So the second variant takes the roomy ones away, and all others go on from
+there: each leaves one part of the search out (or puts one in), and runs the same seeds on the
+fullest voxelizations for the same seconds of one core. Growth is looked at by itself: how many of
+the same root poses end with every voxel of the fullest voxelization in its place.
 """
 
 from __future__ import annotations
@@ -14,27 +16,32 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
 import runs
-from runs import HERE, MODELS
+from runs import HERE, MODELS, Judge
 
+#: The whole product, and what the other variants are compared with.
+PRODUCT, BASE = "several sizes", "full templates"
 #: Variants of the whole search: name and what is different.
 VARIANTS = {
-    "full": "the product's search",
+    PRODUCT: "the product: voxelizations that leave cells free (partial fill), and full ones",
+    BASE: "only the fullest quarter of the voxelizations; so in all rows below",
     "no improvement": "grown trees are only tested: no phase A, no phase B",
-    "no polish": "phase A alone: the first tree that folds is the result",
+    "no polish": "phase A alone: trees are taken as they first fold",
+    "no gathering": "the first tree that folds is polished, not the best of several",
     "no closure": "the objective asks the planner alone, not the closure test",
     "no guide": "the planner starts each tree from nothing, not along the steps of the last",
     "no planner": "the objective asks the closure test alone; the planner filters afterwards",
     "fold afterwards": "the energy alone is lowered; closure and planner filter afterwards",
     "one tree": "one spanning tree for each set of poses instead of several",
-    "octants": "put in: eighths of cells count as they hold material (partial fill)",
-    "carving": "put in: cores of cells count, and what must be carved is weighed",
+    "octants": "put in: eighths of cells count as they hold material, not whole cells",
+    "carving": "put in from the first seed: cores of cells count, carving is weighed",
 }
 #: Variants of growth alone.
 GROWTH = {
@@ -43,30 +50,6 @@ GROWTH = {
     "breadth first + insertion": "a fixed breadth-first order of the voxels",
     "breadth first": "the same, without insertion",
 }
-
-
-@dataclass(frozen=True)
-class Judge:
-    """The product's judge of folding, for others to leave something out."""
-
-    judge: Any
-
-    def stuck(self, system: Any) -> tuple[int, int]:
-        one, two = self.stuck_hinges(system).sum(axis=1)
-        return int(one), int(two)
-
-    def stuck_hinges(self, system: Any) -> Any:
-        return self.judge.stuck_hinges(system)
-
-    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
-        return self.judge.outlook(system, expansions, guide)
-
-    def unresolved(self, system: Any, expansions: int) -> float:
-        left = self.outlook(system, expansions).left
-        return float(left.sum()) / max(1, 2 * len(left))
-
-    def path(self, system: Any, guide: Any = None) -> Any:
-        return self.judge.path(system, guide)
 
 
 class Unclosed(Judge):
@@ -100,65 +83,83 @@ class Unjudged(Unplanned, Unclosed):
     """Takes everything for folding, until a path is asked for."""
 
 
-def changed(variant: str, voxels: Any) -> Any:
-    """The change of a job that makes a variant."""
+def changed(variant: str, job: Any, voxels: Any) -> Any:
+    """The job of a seed as a variant has it."""
     from fabfold.fold.cores import CORE
-    from fabfold.fold.foldability import octants_of
+    from fabfold.fold.foldability import LatticeFoldability, octants_of
 
-    def change(job: Any) -> Any:
-        effort, judge = job.effort, job.foldability
-        if variant == "no improvement":
-            effort = replace(effort, closing=0, looking=0, polishing=0, restarts=10**6)
-        elif variant == "no polish":
-            effort = replace(effort, polishing=0)
-        elif variant == "one tree":
-            effort = replace(effort, trees=1)
-        elif variant == "no closure":
-            judge = Unclosed(judge)
-        elif variant == "no guide":
-            judge = Unguided(judge)
-        elif variant == "no planner":
-            judge = Unplanned(judge)
-        elif variant == "fold afterwards":
-            judge = Unjudged(judge)
-        elif variant == "octants":
-            judge = replace(judge, octants=octants_of(voxels.subvoxels))
-        elif variant == "carving":
-            judge = replace(judge, carve=CORE, material=voxels.subvoxels)
-        elif variant != "full":
-            raise SystemExit(f"no such variant: {variant}")
-        return replace(job, effort=effort, foldability=judge)
+    effort, judge = job.effort, job.foldability
+    if variant == "no improvement":
+        effort = replace(effort, closing=0, looking=0, trying=0, polishing=0)
+    elif variant == "no polish":
+        effort = replace(effort, trying=0, polishing=0)
+    elif variant == "no gathering":
+        effort = replace(effort, gathering=1)
+    elif variant == "one tree":
+        effort = replace(effort, trees=1)
+    elif variant == "no closure":
+        judge = Unclosed(judge)
+    elif variant == "no guide":
+        judge = Unguided(judge)
+    elif variant == "no planner":
+        judge = Unplanned(judge)
+    elif variant == "fold afterwards":
+        judge = Unjudged(judge)
+    elif variant == "octants":
+        judge = LatticeFoldability(octants=octants_of(voxels.subvoxels))
+    elif variant == "carving":
+        judge = LatticeFoldability(carve=CORE, material=voxels.subvoxels)
+    return replace(job, effort=effort, foldability=judge)
 
-    return change
+
+def fullest(options: Sequence[Any], count: int) -> list[Any]:
+    """Those with the most voxels."""
+    return sorted(options, key=len, reverse=True)[:count]
 
 
 def run_variant(
     model: runs.Model, folder: Path, variant: str, seed: int, joints: str, seconds: float
 ) -> dict[str, Any]:
-    """One run of one variant: the seeds of the first round over and over, on the same voxels."""
-    from fabfold.seeds import run_seed
+    """One run of one variant: the product's seeds, one after the other."""
+    from fabfold.seeds import Job, run_seed
 
     kit = runs.voxelized(model, folder)
-    rounds = runs.rounds_of(kit, runs.recipe_of(kit, seed, joints))
-    plain = rounds._job(0)
-    kernels = runs.warm_up(plain, joints)
-    job = changed(variant, rounds.options[0])(plain)
-    runs.warm_up(job, joints)
+    options = kit.voxelize()
+    if variant != PRODUCT:
+        options = fullest(options, max(1, len(options) // 4))
+    rounds = runs.rounds_of(kit, runs.recipe_of(kit, seed, joints), options)
+    first = rounds._seeds(0)[0]
+
+    def job_of(search_seed: int) -> Any:
+        job = rounds.job(search_seed)
+        known = isinstance(job, Job)
+        return changed(variant, job, rounds.voxels(search_seed)) if known else None
+
+    jobs = (job_of(first + k) for k in range(len(options)))
+    kernels = runs.warm_up(next(job for job in jobs if job is not None), joints)
     clock = runs.Recorder(seconds)
-    number, folded = 0, []
+    number, folded = first, []
     while not clock.over():
-        before = len(clock.events)
-        started = clock.cpu
-        best = clock.best
-        clock.best = float("inf")
-        found = run_seed(job, seed * 10_000 + number, clock.report, clock.over)
-        if found.failed:
-            raise SystemExit(found.why)
-        cut = found.cut is not None
-        folded.append([round(clock.cpu - started, 2), len(clock.events) > before, cut])
-        clock.best = min(best, clock.best)
+        job = job_of(number)
+        if job is not None:
+            before, started, best = len(clock.events), clock.cpu, clock.best
+            clock.best = float("inf")
+            found = run_seed(job, number, clock.report, clock.over)
+            if found.failed:
+                raise SystemExit(found.why)
+            for event in clock.events[before:]:
+                event["voxels"] = len(rounds.voxels(number))
+            some = len(clock.events) > before
+            folded.append([round(clock.cpu - started, 2), some, found.cut is not None])
+            clock.best = min(best, clock.best)
         number += 1
-    return {"kernels": kernels, "cpu": clock.cpu, "starts": folded, "events": clock.events}
+    return {
+        "kernels": kernels,
+        "cpu": clock.cpu,
+        "voxels": [len(voxels) for voxels in rounds.options],
+        "starts": folded,
+        "events": clock.events,
+    }
 
 
 # --- growth -----------------------------------------------------------------------------------
@@ -204,9 +205,9 @@ def run_growth(model: runs.Model, folder: Path, variant: str, seed: int, joints:
     from fabfold.tree.ruin import repair
 
     kit = runs.voxelized(model, folder)
-    rounds = runs.rounds_of(kit, runs.recipe_of(kit, seed, joints))
-    job = rounds._job(0)
-    runs.warm_up(job, joints)
+    recipe = runs.recipe_of(kit, seed, joints)
+    rounds = runs.rounds_of(kit, recipe, fullest(kit.voxelize(), 1))
+    job = rounds.job(rounds._seeds(0)[0])
     problem, effort = job.problem, job.effort
     tables = problem.tables
     rng = np.random.default_rng([seed, 7])
@@ -247,8 +248,16 @@ def run_growth(model: runs.Model, folder: Path, variant: str, seed: int, joints:
 # --- table ------------------------------------------------------------------------------------
 
 
-def path_of(work: Path, model: str, variant: str, seed: int) -> Path:
-    return work / "ablation" / f"{model}-{variant.replace(' ', '-')}-{seed}.json"
+def path_of(options: argparse.Namespace, model: str, part: str, seed: int) -> Path:
+    """Where a run is kept, by all that it depends on."""
+    kind = f"{options.joints}-{options.seconds:g}s"
+    return Path(options.work / "ablation" / kind / f"{model}-{part.replace(' ', '-')}-{seed}.json")
+
+
+def missing(options: argparse.Namespace, model: str, seed: int) -> list[str]:
+    """Parts that were not measured yet."""
+    parts = [part for part in [*VARIANTS, *GROWTH] if part in options.parts]
+    return [part for part in parts if not path_of(options, model, part, seed).is_file()]
 
 
 def whole_row(variant: str, entries: list[dict[str, Any]], seconds: float) -> str:
@@ -257,14 +266,17 @@ def whole_row(variant: str, entries: list[dict[str, Any]], seconds: float) -> st
     starts = [s for e in entries for s in e["starts"] if not s[2] or s[1]]
     folded = sum(s[1] for s in starts)
     middle = median(firsts)
+    sizes = sorted({size for e in entries for size in e["voxels"]})
     cells = [
         variant,
+        f"{sizes[0]}–{sizes[-1]}" if len(sizes) > 1 else f"{sizes[0]}",
         f"{len(last)} of {len(entries)}",
         f"> {seconds:g}" if middle == float("inf") else f"{middle:.1f}",
         f"{folded} of {len(starts)}",
         f"{median(sum(v['joints'].values()) for v in last):.0f}" if last else "–",
         f"{median(v['surface'] for v in last):.2f}" if last else "–",
         f"{median(v['total'] for v in last):.2f}" if last else "–",
+        f"{median(v['voxels'] for v in last):.0f}" if last else "–",
     ]
     return "| " + " | ".join(cells) + f" | {VARIANTS[variant]} |"
 
@@ -284,12 +296,15 @@ def table(data: dict[str, Any], facts: dict[str, Any]) -> str:
     lines = [
         "# What each part of the search brings",
         "",
-        "Written by `python benchmarks/ablation.py`. Every variant leaves one part of the search",
-        "out, or puts one in, and runs the same seeds on the same voxels for",
-        f"{facts['seconds']:g} seconds of one core each, joints {facts['joints']}. *Folds*: seeds",
-        "with a tree that folds as cubes on the lattice. *Runs*: how many of the search's own",
-        "seeds that came to an end, or found a tree, found one.",
-        "Joints and energies: median of the seeds that fold.",
+        "Written by `python benchmarks/ablation.py`. The product's seeds take voxelizations of",
+        "several sizes in turn, and roomy ones fold at once whatever is left out. So the second",
+        "row has the fullest voxelizations only, and each row below leaves one part of the search",
+        "out besides, or puts one in. All run the same seeds for "
+        f"{facts['seconds']:g} seconds of one core each,",
+        f"joints {facts['joints']}. *Voxels*: of the voxelizations searched. *Folds*: seeds with a",
+        "tree that folds as cubes on the lattice. *Runs*: how many of the search's own seeds that",
+        "came to an end, or found a tree, found one. Joints, energies, and *of voxels*: those of",
+        "the best tree, median of the seeds that fold.",
         "",
         f"Machine: {runs.machine_line(facts)}.",
     ]
@@ -300,8 +315,9 @@ def table(data: dict[str, Any], facts: dict[str, Any]) -> str:
                 "",
                 f"## {model}",
                 "",
-                "| variant | folds | first s, median | runs | joints | surface | energy | what |",
-                "|---|--:|--:|--:|--:|--:|--:|---|",
+                "| variant | voxels | folds | first s, median | runs | joints | surface | energy |"
+                " of voxels | what |",
+                "|---|--:|--:|--:|--:|--:|--:|--:|--:|---|",
             ]
             lines += [whole_row(v, by_variant[v], facts["seconds"]) for v in whole]
         growth = [v for v in GROWTH if v in by_variant]
@@ -322,33 +338,35 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--models", nargs="+", default=["bunny", "kitten"])
-    parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3, 4, 5])
-    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3])
+    parser.add_argument("--seconds", type=float, default=12.0)
     parser.add_argument("--joints", default="S", choices=["S", "S+D"])
     parser.add_argument("--parts", nargs="+", default=[*VARIANTS, *GROWTH])
     parser.add_argument("--work", type=Path, default=Path("search-runs"))
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only-table", action="store_true")
     parser.add_argument("--out", type=Path, default=HERE / "ablation.md")
-    parser.add_argument("--one", nargs=3, help=argparse.SUPPRESS)
+    parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
     options = parser.parse_args()
+    unknown = [part for part in options.parts if part not in VARIANTS | GROWTH]
+    if unknown:
+        parser.error(f"no such parts: {', '.join(unknown)}")
     if options.one:
-        name, variant, seed = options.one[0], options.one[1], int(options.one[2])
-        where = (MODELS[name], options.work / name, variant, seed, options.joints)
-        found = run_growth(*where) if variant in GROWTH else run_variant(*where, options.seconds)
-        found |= {"seconds": options.seconds, "joints": options.joints}
-        runs.write(path_of(options.work, name, variant, seed), found)
+        name, seed = options.one[0], int(options.one[1])
+        for part in missing(options, name, seed):
+            where = (MODELS[name], options.work / name, part, seed, options.joints)
+            found = run_growth(*where) if part in GROWTH else run_variant(*where, options.seconds)
+            runs.write(path_of(options, name, part, seed), found)
         return
     if not options.only_table:
         jobs = [
-            (name, variant, str(seed))
+            (name, str(seed))
             for seed in options.seeds
             for name in options.models
-            for variant in options.parts
-            if not path_of(options.work, name, variant, seed).is_file()
+            if missing(options, name, seed)
         ]
         base = [sys.executable, __file__, "--work", str(options.work), "--joints", options.joints]
-        base += ["--seconds", str(options.seconds)]
+        base += ["--seconds", str(options.seconds), "--parts", *options.parts]
         for name in options.models:
             runs.voxelized(MODELS[name], options.work / name)
         runs.side_by_side(
@@ -357,7 +375,7 @@ def main() -> None:
     data: dict[str, Any] = {}
     for name in MODELS:
         for variant in [*VARIANTS, *GROWTH]:
-            entries = [runs.read(path_of(options.work, name, variant, s)) for s in options.seeds]
+            entries = [runs.read(path_of(options, name, variant, s)) for s in options.seeds]
             if any(entries):
                 data.setdefault(name, {})[variant] = [e for e in entries if e]
     facts = {**runs.machine(), "seconds": options.seconds, "joints": options.joints}

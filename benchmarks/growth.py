@@ -1,13 +1,15 @@
 """Growth of time and memory with the number of cells: writes benchmarks/growth.md and .json.
 
     python benchmarks/growth.py [--model sample:elephant] [--sides 3 4 5 6 8] [--budget 120]
-        [--seed 1] [--only-table]
+        [--seed 1] [--workers 2] [--only-table]
 
-For a box of each size: seconds and peak memory to voxelize the model, to the first tree that fits
-the template, and to the first tree that folds. Every stage runs in a process of its own, compiled
-kernels are loaded before the clock starts, and seconds are of the process's own CPU time, so that
-whatever else the machine does counts little. The search for a tree that folds ends with the budget;
-the table then tells how near the planner came.
+For a box of each size: seconds and peak memory to cut the model into the product's voxelizations of
+several sizes, to the first tree that fits the template, to the first tree that passes the closure
+test, and to the first tree that folds. Seeds take the voxelizations as in the product, roomy ones
+first. Every stage runs in a process of its own, compiled kernels are loaded before the clock
+starts, and seconds are of the process's own CPU time, so that whatever else the machine does counts
+little. The search ends with the first tree that folds or with the budget; the table then tells how
+near the planner came.
 """
 
 from __future__ import annotations
@@ -19,10 +21,16 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
-HERE = Path(__file__).resolve().parent
+import numpy as np
+import runs
+from runs import HERE, Judge
+
 SIDES = (3, 4, 5, 6, 8)
 
 
@@ -30,6 +38,11 @@ def say(**figures: Any) -> None:
     """A line for the parent: figures so far, with the memory used up to now."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(json.dumps({**figures, "megabytes": round(peak)}), flush=True)
+
+
+def name_of(side: int) -> str:
+    """Template of a cube."""
+    return f"box-{side}x{side}x{side}"
 
 
 def do_solid(model: str, folder: Path) -> None:
@@ -43,127 +56,107 @@ def do_solid(model: str, folder: Path) -> None:
 
 def do_voxelize(side: int, seed: int, folder: Path) -> None:
     from fabfold.lattice import load_template
-    from fabfold.rounds import search_order
-    from fabfold.stagefiles import load_solid
+    from fabfold.stagefiles import load_solid, save_options
     from fabfold.store import StageStore
     from fabfold.voxels.search import voxelize
-    from fabfold.voxels.store import save_voxels
 
     solid = load_solid(StageStore(folder), ["solid.npz"])
-    voxelize(solid, load_template("box-3x3x3"), seed=seed, placements=2, shortlist=1, results=1)
-    template = load_template(f"box-{side}x{side}x{side}")
+    voxelize(solid, load_template(name_of(3)), seed=seed, placements=2, shortlist=1, results=1)
     start = time.process_time()
-    options = voxelize(solid, template, seed=seed)
+    options = voxelize(solid, load_template(name_of(side)), seed=seed)
     seconds = time.process_time() - start
-    chosen = search_order(options, len(template))[0]
-    save_voxels(folder / f"{side}.npz", chosen)
+    files = save_options(StageStore(folder / str(side)), options)
     say(
         seconds=round(seconds, 2),
-        voxels=len(chosen),
-        fill=round(float(chosen.fill.mean()), 3),
-        lost=round(float(chosen.lost_volume), 4),
+        voxels=[len(voxels) for voxels in options],
+        fill=[round(float(voxels.fill.mean()), 3) for voxels in options],
+        files=files,
     )
 
 
-def do_tree(side: int, seed: int, folder: Path, budget: float) -> None:
-    import numpy as np
+class Watched(Judge):
+    """Notes how near the closure test and the planner came."""
 
-    from fabfold.errors import FabfoldError
-    from fabfold.fold.foldability import LatticeFoldability
-    from fabfold.lattice import load_template
-    from fabfold.tree.effort import Effort
-    from fabfold.tree.problem import from_features
-    from fabfold.tree.solve import Candidate, grow, solve
-    from fabfold.voxels.features import features
-    from fabfold.voxels.store import load_voxels
+    def __init__(self, judge: Any, notes: dict[str, Any], clock: runs.Recorder) -> None:
+        super().__init__(judge)
+        self.notes = notes
+        self.clock = clock
 
-    template = load_template(f"box-{side}x{side}x{side}")
-    voxels = load_voxels(folder / f"{side}.npz")
+    def stuck_hinges(self, system: Any) -> Any:
+        stuck = super().stuck_hinges(system)
+        jammed, hinges = int(stuck.any(axis=0).sum()), stuck.shape[1]
+        before = self.notes.get("stuck")
+        if before is None or jammed * before[1] < before[0] * hinges:
+            self.notes["stuck"] = (jammed, hinges)
+            say(**self.notes)
+        if jammed == 0 and "closed" not in self.notes:
+            self.notes["closed"] = round(self.clock.cpu, 2)
+            say(**self.notes)
+        return stuck
 
-    class Watched(LatticeFoldability):
-        """Notes how near the planner came."""
+    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        found = super().outlook(system, expansions, guide)
+        share = (int(found.left.sum()), int(np.abs(system.turns).sum()))
+        before = self.notes.get("left")
+        if before is None or share[0] * before[1] < before[0] * share[1]:
+            self.notes["left"] = share
+            say(**self.notes)
+        return found
 
-        def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
-            found = super().outlook(system, expansions, guide)
-            left = found.left
-            share = (int(left.sum()), int(np.abs(system.turns).sum()))
-            if best[0] is None or share[0] * best[0][1] < best[0][0] * share[1]:
-                best[0] = share
-                say(left=share, first_tree=first_tree, hinges=len(system.turns))
-            return found
 
-        def stuck_hinges(self, system: Any) -> Any:
-            stuck = super().stuck_hinges(system)
-            jammed = int(stuck.any(axis=0).sum())
-            if best[0] is None and (best[1] is None or jammed < best[1]):
-                best[1] = jammed
-                say(stuck=(jammed, len(system.turns)), first_tree=first_tree)
-            return stuck
+def do_tree(
+    model: str, side: int, seed: int, folder: Path, budget: float, files: list[str]
+) -> None:
+    """The product's seeds, one after the other, until one folds."""
+    from fabfold.kit import Kit
+    from fabfold.seeds import Job, run_seed
+    from fabfold.stagefiles import load_options
+    from fabfold.store import StageStore
+    from fabfold.tree.starts import grow
+    from fabfold.warming import strip_job
 
-    best: list[Any] = [None, None]
-    first_tree = 0.0
-    # A strip of 8 in 2 x 2 x 2 calls every kernel once.
-    warm_up(LatticeFoldability(), Effort(polishing=5))
-    start = time.process_time()
-    problem = from_features(voxels, features(voxels), template)
-    next(grow(problem, seed))
-    first_tree = round(time.process_time() - start, 2)
-    say(first_tree=first_tree)
-
-    found: list[Candidate] = []
+    kit = Kit.from_model(model, template=name_of(side), seed=seed)
+    options = load_options(StageStore(folder / str(side)), files)
+    rounds = runs.rounds_of(kit, kit.recipe, options)
+    run_seed(strip_job(), 0, lambda _: None, lambda: False)
+    notes: dict[str, Any] = {}
+    first = rounds._seeds(0)[0]
+    found: list[Any] = []
+    clock = runs.Recorder(budget)
 
     def stop() -> bool:
-        return bool(found) or time.process_time() - start > budget
+        return bool(found) or clock.over()
 
-    start = time.process_time()
-    try:
-        effort = Effort(roots=10**6, restarts=10**6)
-        solve(problem, seed, Watched(), effort, report=found.append, stop=stop)
-    except FabfoldError as error:
-        if time.process_time() - start < budget:
-            say(first_tree=first_tree, error=str(error), left=best[0])
-            return
-    if found:
-        say(
-            first_tree=first_tree,
-            folds=round(time.process_time() - start, 2),
-            hinges=len(found[0].tree.hinges),
-            moves=len(found[0].path),
-        )
-
-
-def warm_up(judge: Any, effort: Any) -> None:
-    import numpy as np
-
-    from fabfold.lattice import load_template
-    from fabfold.tree.problem import tree_problem
-    from fabfold.tree.solve import solve
-
-    cells = np.array([(i, 0, 0) for i in range(8)], dtype=np.int32)
-    pairs = np.array([(i, i + 1) for i in range(7)], dtype=np.int32)
-    strip = tree_problem(
-        cells,
-        load_template("box-2x2x2"),
-        pairs=pairs,
-        rigid=np.ones(7, dtype=bool),
-        hinge=np.ones((7, 4), dtype=bool),
-        depth=np.zeros((8, 6)),
-    )
-    solve(strip, 0, judge, effort)
+    for number in count(first):
+        job = rounds.job(number)
+        if stop():
+            break
+        if not isinstance(job, Job):
+            if number - first >= len(options) and "grown" not in notes:
+                say(error=job.why)
+                return
+            continue
+        if "grown" not in notes and next(grow(job.problem, number), None) is not None:
+            notes["grown"] = round(clock.cpu, 2)
+            say(**notes)
+            clock = runs.Recorder(budget)
+        job = replace(job, foldability=Watched(job.foldability, notes, clock))
+        ended = run_seed(job, number, found.append, stop)
+        if ended.failed:
+            raise SystemExit(ended.why)
+        if found:
+            notes["folds"] = round(clock.cpu, 2)
+            notes["joined"] = len(rounds.voxels(number))
+            notes["hinges"] = len(found[0].tree.hinges)
+            notes["moves"] = len(found[0].path)
+        notes["seeds"] = number - first + 1
+        say(**notes)
 
 
-def measured(arguments: list[str], limit: float) -> dict[str, Any]:
-    """Last figures of one stage in a process of its own, killed after `limit` CPU seconds."""
-
-    def bounded() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 5))
-
+def measured(arguments: list[str]) -> dict[str, Any]:
+    """Last figures of one stage in a process of its own."""
     done = subprocess.run(
-        [sys.executable, __file__, *arguments],
-        check=False,
-        stdout=subprocess.PIPE,
-        text=True,
-        preexec_fn=bounded,
+        [sys.executable, __file__, *arguments], check=False, stdout=subprocess.PIPE, text=True
     )
     figures: dict[str, Any] = {}
     for line in done.stdout.splitlines():
@@ -172,54 +165,77 @@ def measured(arguments: list[str], limit: float) -> dict[str, Any]:
     return figures
 
 
+def bounded(seconds: float) -> None:
+    """End this process after so many CPU seconds, whatever it does."""
+    resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds) + 5))
+
+
 def told(row: dict[str, Any], budget: float) -> str:
-    """The last column: how the search ended."""
+    """How the search ended."""
     tree = row["tree"]
     if "folds" in tree:
-        return f"{tree['folds']:.1f} s, {tree['hinges']} hinges, {tree['moves']} moves"
+        return (
+            f"{tree['folds']:.1f} s: {tree['joined']} voxels, {tree['hinges']} hinges, "
+            f"{tree['moves']} moves"
+        )
     if tree.get("left"):
         left, total = tree["left"]
-        return f"not folded in {budget:g} s, {left} of {total} quarter turns left"
+        return f"not in {budget:g} s, {left} of {total} quarter turns left"
     if "stuck" in tree:
-        return (
-            f"not folded in {budget:g} s, {tree['stuck'][0]} of {tree['stuck'][1]} hinges "
-            "locked in the best tree"
-        )
-    return f"not folded in {budget:g} s, no tree whose hinges can turn joins all voxels"
+        return f"not in {budget:g} s, {tree['stuck'][0]} of {tree['stuck'][1]} hinges locked"
+    return str(tree.get("error", f"not in {budget:g} s, no tree whose hinges can turn"))
 
 
 def table(data: dict[str, Any]) -> str:
     lines = [
         "# Growth with the number of cells",
         "",
-        f"Written by `python benchmarks/growth.py`: {data['model']}, seed {data['seed']}, at most "
-        f"{data['budget']:g} s for the tree. Seconds are CPU time of one core; memory is the peak "
-        "of the stage's own process, Python and libraries included.",
+        f"Written by `python benchmarks/growth.py`: {data['model']}, seed {data['seed']}, at most",
+        f"{data['budget']:g} s for the search. Seconds are CPU time of one core; memory is the",
+        "peak of the stage's own process, Python and libraries included. *Voxels*: sizes of the",
+        "voxelizations, which seeds take in turn, roomy ones first. *Fits*: growing, to the first",
+        "tree that fits. From there on the search: *closed*, to the first tree whose hinges all",
+        "pass the closure test, and *folds*, to the first one with a folding path.",
         "",
-        "| cells | voxels | voxelize | memory | first tree that fits | first tree that folds |"
-        " memory |",
-        "|---:|---:|---:|---:|---:|---|---:|",
+        f"Machine: {runs.machine_line(data['machine'])}.",
+        "",
+        "| cells | voxels | voxelize | memory | fits | closed | folds | memory |",
+        "|---:|---|---:|---:|---:|---:|---|---:|",
     ]
     for row in data["rows"]:
         cut, tree = row["voxelize"], row["tree"]
-        fits = f"{tree['first_tree']:.2f} s" if "first_tree" in tree else "none"
+        sizes = cut.get("voxels") or [0]
         lines.append(
-            f"| {row['side'] ** 3} | {cut.get('voxels', '-')} | {cut.get('seconds', 0):.1f} s | "
-            f"{cut.get('megabytes', 0)} MB | {fits} | {told(row, data['budget'])} | "
-            f"{tree.get('megabytes', 0)} MB |"
+            f"| {row['side'] ** 3} | {min(sizes)}–{max(sizes)} | {cut.get('seconds', 0):.1f} s | "
+            f"{cut.get('megabytes', 0)} MB | "
+            + " | ".join(f"{tree[k]:.2f} s" if k in tree else "–" for k in ("grown", "closed"))
+            + f" | {told(row, data['budget'])} | {tree.get('megabytes', 0)} MB |"
         )
     return "\n".join(lines) + "\n"
+
+
+def row_of(side: int, common: list[str]) -> dict[str, Any]:
+    """All that is measured for one size."""
+    row: dict[str, Any] = {"side": side, "tree": {}}
+    row["voxelize"] = measured(["--stage", "voxelize", str(side), *common])
+    if files := row["voxelize"].get("files"):
+        row["tree"] = measured(["--stage", "tree", str(side), "--files", *files, *common])
+    print(json.dumps(row), file=sys.stderr, flush=True)
+    return row
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--model", default="sample:elephant", help="sample:NAME or a file")
     parser.add_argument("--sides", type=int, nargs="+", default=list(SIDES))
-    parser.add_argument("--budget", type=float, default=120.0, help="CPU seconds for the tree")
+    parser.add_argument("--budget", type=float, default=120.0, help="CPU seconds for the search")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=2, help="sizes side by side")
+    parser.add_argument("--out", type=Path, default=HERE / "growth.md")
     parser.add_argument("--only-table", action="store_true", help="from growth.json")
     parser.add_argument("--stage", nargs=2, help=argparse.SUPPRESS)
     parser.add_argument("--folder", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--files", nargs="*", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.stage:
         name, side = options.stage[0], int(options.stage[1])
@@ -228,33 +244,32 @@ def main() -> None:
         elif name == "voxelize":
             do_voxelize(side, options.seed, options.folder)
         else:
-            do_tree(side, options.seed, options.folder, options.budget)
+            # Growing polls nothing, and a first tree may take long.
+            bounded(2 * options.budget + 120)
+            where = (options.model, side, options.seed, options.folder)
+            do_tree(*where, options.budget, options.files)
         return
-    kept = HERE / "growth.json"
+    kept = options.out.with_suffix(".json")
     if options.only_table:
         data = json.loads(kept.read_text(encoding="utf-8"))
     else:
         data = {
+            "machine": runs.machine(),
             "model": options.model,
             "seed": options.seed,
             "budget": options.budget,
-            "rows": [],
         }
         with tempfile.TemporaryDirectory() as folder:
             common = ["--folder", folder, "--seed", str(options.seed), "--model", options.model]
             common += ["--budget", str(options.budget)]
-            measured(["--stage", "solid", "0", *common], 900)
-            for side in options.sides:
-                row: dict[str, Any] = {"side": side}
-                row["voxelize"] = measured(["--stage", "voxelize", str(side), *common], 900)
-                row["tree"] = {}
-                if (Path(folder) / f"{side}.npz").is_file():
-                    limit = 2 * options.budget + 120
-                    row["tree"] = measured(["--stage", "tree", str(side), *common], limit)
-                data["rows"].append(row)
-                print(json.dumps(row), flush=True)
-                kept.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    (HERE / "growth.md").write_text(table(data), encoding="utf-8")
+            measured(["--stage", "solid", "0", *common])
+            # The largest takes longest: it comes first.
+            sides = sorted(options.sides, reverse=True)
+            with ThreadPoolExecutor(options.workers) as pool:
+                rows = list(pool.map(lambda side: row_of(side, common), sides))
+        data["rows"] = rows[::-1]
+        kept.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    options.out.write_text(table(data), encoding="utf-8")
     print(table(data))
 
 

@@ -151,8 +151,8 @@ def recipe_of(kit: Any, seed: int, joints: str | None) -> Any:
     return type(kit.recipe)(**fields)
 
 
-def rounds_of(kit: Any, recipe: Any) -> Any:
-    """Rounds of seeds over the kit's voxelizations for another recipe."""
+def rounds_of(kit: Any, recipe: Any, options: Sequence[Any] | None = None) -> Any:
+    """Rounds of seeds over the kit's voxelizations, or over some of them, for another recipe."""
     from fabfold.progress import SilentListener
     from fabfold.rounds import Rounds
     from fabfold.store import StageStore
@@ -160,7 +160,7 @@ def rounds_of(kit: Any, recipe: Any) -> Any:
     return Rounds(
         recipe,
         kit.template,
-        kit.voxelize(),
+        kit.voxelize() if options is None else options,
         key="",
         store=StageStore(None),
         workers=1,
@@ -169,43 +169,40 @@ def rounds_of(kit: Any, recipe: Any) -> Any:
 
 
 def warm_up(job: Any, joints: Any) -> float:
-    """Compile all kernels, or load them from the cache, with a bar that folds; CPU seconds."""
-    import numpy as np
-
-    from fabfold.lattice import load_template
-    from fabfold.seeds import Job, run_seed
-    from fabfold.tree.effort import EFFORTS
-    from fabfold.tree.problem import tree_problem
+    """Compile all kernels, or load them from the cache; CPU seconds."""
+    from fabfold.seeds import run_seed
+    from fabfold.warming import strip_job
 
     start = time.process_time()
-    cells = np.array([(i, 0, 0) for i in range(8)], dtype=np.int32)
-    pairs = np.array([(i, i + 1) for i in range(7)], dtype=np.int32)
-    bar = tree_problem(
-        cells,
-        load_template("box-2x2x2"),
-        pairs=pairs,
-        rigid=np.ones(7, dtype=bool),
-        hinge=np.ones((7, 4), dtype=bool),
-        depth=np.zeros((8, 6)),
-        double=np.ones(7, dtype=bool),
-        joints=joints,
-    )
-    run_seed(Job(bar, _plain(job.foldability), EFFORTS["quick"]), 1, lambda _: None, lambda: False)
-    # The real problem may use kernels that the bar does not: two seconds of it, thrown away.
+    run_seed(strip_job(joints), 1, lambda _: None, lambda: False)
+    # The real problem may use kernels that the strip does not: two seconds of it, thrown away.
     until = time.process_time() + 2.0
     run_seed(job, 0, lambda _: None, lambda: time.process_time() > until)
     return time.process_time() - start
 
 
-def _plain(foldability: Any) -> Any:
-    """The judge without what belongs to one voxelization."""
-    from dataclasses import replace
+class Judge:
+    """The product's judge of folding, for others to leave something out or to look on."""
 
-    from fabfold.fold.foldability import LatticeFoldability
+    def __init__(self, judge: Any) -> None:
+        self.judge = judge
 
-    if not isinstance(foldability, LatticeFoldability):
-        return foldability
-    return replace(foldability, octants=None, material=None)
+    def stuck(self, system: Any) -> tuple[int, int]:
+        one, two = self.stuck_hinges(system).sum(axis=1)
+        return int(one), int(two)
+
+    def stuck_hinges(self, system: Any) -> Any:
+        return self.judge.stuck_hinges(system)
+
+    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        return self.judge.outlook(system, expansions, guide)
+
+    def unresolved(self, system: Any, expansions: int) -> float:
+        left = self.outlook(system, expansions).left
+        return float(left.sum()) / max(1, 2 * len(left))
+
+    def path(self, system: Any, guide: Any = None) -> Any:
+        return self.judge.path(system, guide)
 
 
 class Recorder:
@@ -285,25 +282,19 @@ def timed_run(
         Changes each job, for the ablation.
     """
     from fabfold.errors import FabfoldError
-    from fabfold.seeds import run_seed
+    from fabfold.seeds import Job, run_seed
 
     facts: dict[str, Any] = {"seed": seed, "joints": joints, "seconds": seconds}
     try:
         kit = voxelized(model, folder)
         rounds = rounds_of(kit, recipe_of(kit, seed, joints))
-        jobs: dict[int, Any] = {}
-
-        def job_of(number: int) -> Any:
-            option = number % len(rounds.options)
-            if option not in jobs:
-                job = rounds._job(number)
-                jobs[option] = job if change is None else change(job)
-            return jobs[option]
-
-        facts["kernels"] = warm_up(job_of(0), rounds.recipe.joints)
+        first = rounds.job(rounds._seeds(0)[0])
+        if not isinstance(first, Job):
+            return {**facts, "error": first.why, "events": [], "trees": {}}
+        facts["kernels"] = warm_up(first, rounds.recipe.joints)
     except FabfoldError as error:
         return {**facts, "error": str(error), "events": [], "trees": {}}
-    jobs.clear()
+    rounds = rounds_of(kit, rounds.recipe)  # the making of the jobs counts
     clock = Recorder(seconds)
     ended = []
     number = 0
@@ -311,12 +302,13 @@ def timed_run(
         for search_seed in rounds._seeds(number):
             if clock.over():
                 break
-            clock.option = number % len(rounds.options)
-            try:
-                result = run_seed(job_of(number), search_seed, clock.report, clock.over)
-            except FabfoldError as error:
-                ended.append([search_seed, clock.option, round(clock.cpu, 2), str(error)])
-                continue
+            clock.option = rounds._option(search_seed)
+            job = rounds.job(search_seed)
+            if isinstance(job, Job):
+                job = job if change is None else change(job)
+                result = run_seed(job, search_seed, clock.report, clock.over)
+            else:
+                result = job
             if result.failed:
                 raise SystemExit(result.why)
             why = "" if result.candidates else result.why

@@ -25,8 +25,11 @@ import runs
 from runs import DEV, HERE, MODELS, PAPER
 
 SEEDS = (1, 2, 3, 4, 5)
-#: Seconds at which the best so far is told, where runs were as long.
+#: Seconds of `MARK_CORES` cores, for all seeds of a row together, at which the best is told.
 MARKS = (60.0, 300.0)
+MARK_CORES = 2
+#: The same in processor seconds of each of these runs, which all get as many.
+CORE_MARKS = tuple(mark * MARK_CORES / len(SEEDS) for mark in MARKS)
 
 
 def path_of(work: Path, kind: str, name: str, joints: str, seed: int) -> Path:
@@ -123,12 +126,21 @@ def first_certified(run: dict[str, Any]) -> float | None:
     return float(run["events"][proof["first"]]["cpu"])
 
 
+def length(run: dict[str, Any]) -> float:
+    """Processor seconds that a run had."""
+    return float(min(run["seconds"], run["cpu"]))
+
+
 def best_at(run: dict[str, Any], seconds: float) -> dict[str, Any] | None:
-    """Best tree after so many seconds; None where there was none, or the run was shorter."""
-    if run["seconds"] < seconds:
-        return None
+    """Best tree after so many processor seconds of the run; None where there was none yet."""
     found = [event for event in run["events"] if event["cpu"] <= seconds]
     return found[-1] if found else None
+
+
+def voxels_of(run: dict[str, Any], event: dict[str, Any]) -> int:
+    """Number of voxels of the voxelization that a tree joins."""
+    option = {search_seed: option for search_seed, option, *_ in run["ended"]}
+    return int(run["voxels"][option[event["seed"]]])
 
 
 def joints_of(event: dict[str, Any]) -> int:
@@ -136,10 +148,20 @@ def joints_of(event: dict[str, Any]) -> int:
 
 
 def spread(values: list[float], form: str = "{:.0f}") -> str:
-    """Least of some values, and their median in brackets."""
-    if not values:
-        return "–"
-    return f"{form.format(min(values))} ({form.format(median(values))})"
+    """Least of some values, and their median in brackets; infinite where there was no tree."""
+    told = ["–" if v == float("inf") else form.format(v) for v in (min(values), median(values))]
+    return told[0] if told[0] == "–" else f"{told[0]} ({told[1]})"
+
+
+def at_mark(entries: list[dict[str, Any]], mark: float) -> list[str]:
+    """Joints and energy of the best trees at a mark; dashes where a run was shorter."""
+    if any(length(run) < mark for run in entries):
+        return ["–", "–"]
+    best = [best_at(run, mark) for run in entries]
+    return [
+        spread([float("inf") if event is None else joints_of(event) for event in best]),
+        spread([float("inf") if event is None else event["total"] for event in best], "{:.2f}"),
+    ]
 
 
 def seconds_of(entries: list[dict[str, Any]]) -> tuple[str, str]:
@@ -153,13 +175,13 @@ def seconds_of(entries: list[dict[str, Any]]) -> tuple[str, str]:
     return told(median(times)), told(times[-1])
 
 
-def marks_of(entries: list[dict[str, Any]]) -> list[float]:
-    """Seconds at which the best so far is told."""
-    longest = max((run["seconds"] for run in entries), default=MARKS[0])
-    return [mark for mark in MARKS if mark <= longest] or [longest]
+def told_range(values: list[int]) -> str:
+    """Least and largest."""
+    low, high = min(values), max(values)
+    return f"{low}" if low == high else f"{low}–{high}"
 
 
-def row(name: str, joints: str, by_seed: dict[str, Any], marks: list[float]) -> str:
+def row(name: str, joints: str, by_seed: dict[str, Any]) -> str:
     model, entries = MODELS[name], list(by_seed.values())
     if all("error" in run for run in entries):
         return f"| {name} | {joints} | {model.template} | | {entries[0]['error']} |"
@@ -169,16 +191,16 @@ def row(name: str, joints: str, by_seed: dict[str, Any], marks: list[float]) -> 
     cells = [
         name,
         joints,
-        f"{entries[0]['voxels'][0]} in {model.template}",
+        f"{told_range(entries[0]['voxels'])} in {model.template}",
         f"{len(certified)} of {len(entries)}",
         middle,
         worst,
         f"{model.aim_seconds:g}" if model.aim_seconds else "–",
     ]
-    for mark in marks:
-        best = [event for run in entries if (event := best_at(run, mark))]
-        cells.append(spread([joints_of(event) for event in best]))
-        cells.append(spread([event["total"] for event in best], "{:.2f}"))
+    for mark in CORE_MARKS:
+        cells += at_mark(entries, mark)
+    sizes = [voxels_of(run, run["events"][-1]) for run in entries if run["events"]]
+    cells.append(f"{median(sizes):.0f}" if sizes else "–")
     proofs = [p for run in entries if run["proof"] for p in run["proof"]["tried"].values()]
     refused = sum(not p["ok"] for p in proofs)
     proofs = [p for p in proofs if p["ok"]]
@@ -197,39 +219,57 @@ def row(name: str, joints: str, by_seed: dict[str, Any], marks: list[float]) -> 
     return "| " + " | ".join(cells) + " |"
 
 
-def head(marks: list[float]) -> list[str]:
+def head() -> list[str]:
     cells = ["model", "joints", "voxels", "certified", "first s, median", "worst", "aim"]
-    for mark in marks:
+    for mark in MARKS:
         cells += [f"joints {mark:g} s", f"energy {mark:g} s"]
-    cells += ["best certified", "refused", "aim", "paper", "paper core-h"]
+    cells += ["voxels of the best", "best certified", "refused", "aim", "paper", "paper core-h"]
     cells += ["proven mm", "sampled mm", "build s", "voxels s"]
     return ["| " + " | ".join(cells) + " |", "|---|---|---|" + "--:|" * (len(cells) - 3)]
 
 
 def compared(data: dict[str, Any]) -> list[str]:
-    """Surface energy with double hinges against single hinges alone."""
+    """Surface energy with double hinges against single hinges alone, seed by seed."""
     lines = []
     for name, kinds in data.items():
-        last = {
-            joints: [run["events"][-1] for run in by_seed.values() if run["events"]]
-            for joints, by_seed in kinds.items()
-        }
-        if not (last.get("S") and last.get("S+D")):
+        pairs = [
+            (run, kinds["S+D"][seed])
+            for seed, run in kinds.get("S", {}).items()
+            if seed in kinds.get("S+D", {})
+        ]
+        pairs = [pair for pair in pairs if not any("error" in run for run in pair)]
+        if not pairs:
             continue
-        one, two = (median(e["surface"] for e in last[j]) for j in ("S", "S+D"))
-        doubles = median(e["joints"].get("D", 0) for e in last["S+D"])
-        change = f"{100 * (two / one - 1):+.0f} %" if one else "–"
-        lines.append(f"| {name} | {one:.2f} | {two:.2f} | {change} | {doubles:.0f} |")
+        # The longer runs are told as they were when the shortest ended.
+        seconds = min(length(run) for pair in pairs for run in pair)
+        found = [(best_at(one, seconds), best_at(two, seconds)) for one, two in pairs]
+        both = [(one, two) for one, two in found if one is not None and two is not None]
+        told = f"| {name} | {seconds:.0f} | {len(both)} of {len(pairs)} |"
+        if not both:
+            lines.append(f"{told} – | – | – | – | – | – |")
+            continue
+        single = median(one["surface"] for one, _ in both)
+        double = median(two["surface"] for _, two in both)
+        doubles = median(two["joints"].get("D", 0) for _, two in both)
+        counts = [median(joints_of(pair[k]) for pair in both) for k in (0, 1)]
+        change = f"{100 * (double / single - 1):+.0f} %" if single else "–"
+        lines.append(
+            f"{told} {single:.2f} | {double:.2f} | {change} | {counts[0]:.0f} | {counts[1]:.0f} |"
+            f" {doubles:.0f} |"
+        )
     if not lines:
         return []
     return [
         "",
         "## Surface energy, double hinges beside single ones",
         "",
-        "Eq. 8, median of the seeds' best trees at the end of the run; the aim is a third less.",
+        "Eq. 8, median of the seeds' best trees, at as many processor seconds of each run (those",
+        "of the shortest); of the seeds that have a tree of both kinds by then. The aim is a third",
+        "less.",
         "",
-        "| model | S | S+D | change | double joints |",
-        "|---|--:|--:|--:|--:|",
+        "| model | core s | seeds | surface S | surface S+D | change | joints S | joints S+D |"
+        " of these double |",
+        "|---|--:|--:|--:|--:|--:|--:|--:|--:|",
         *lines,
     ]
 
@@ -258,20 +298,30 @@ def table(data: dict[str, Any], facts: dict[str, Any]) -> str:
     """Markdown of all that is there."""
     runs_there = [run for kinds in data.values() for by in kinds.values() for run in by.values()]
     measured = [run for run in runs_there if "error" not in run]
-    marks = marks_of(measured)
     load = max((run["wall"] / max(run["cpu"], 1e-9) for run in measured), default=1.0)
+    lengths = [round(run["seconds"]) for run in measured] or [0]
     kernels = max((run["kernels"] for run in measured), default=0.0)
     lines = [
         "# Trees that fold",
         "",
         "Written by `python benchmarks/search_table.py`. A run is one model, one seed and one",
-        f"set of joints on one core, {facts['workers']} runs side by side, with the product's",
-        "defaults. Seconds are seconds of that core from the start of the search, with voxels",
-        f"made and kernels loaded before (at most {kernels:.1f} s); the clock showed at most",
-        f"{load:.2f} times as much. *Certified*: seeds with a tree whose printed bodies were",
-        "built, proven by the swept test, and seen free of collision at every degree by another",
-        "check. *First*: when the first such tree was found; building and proving it takes *build",
-        "s* more. *Joints* and *energy* (paper's weights): best of the seeds, median in brackets.",
+        f"set of joints on one core for {told_range(lengths)} s, {facts['workers']} runs side by",
+        "side, with the product's defaults. Seconds are seconds of that core from the start of the",
+        f"search, with voxels made and kernels loaded before (at most {kernels:.1f} s); the clock",
+        f"showed at most {load:.2f} times as much. *Certified*: seeds with a tree whose printed",
+        "bodies were built, proven by the swept test, and seen free of collision at every degree",
+        "by another check. *First*: when the first such tree was found; building and proving it",
+        "takes *build s* more.",
+        "",
+        "*Joints* and *energy* (paper's weights): the best of all seeds, the median seed's in",
+        f"brackets, after {MARKS[0]:g} s and {MARKS[1]:g} s of {MARK_CORES} cores for all "
+        f"{len(SEEDS)} seeds together:",
+        f"each run then had {CORE_MARKS[0]:g} and {CORE_MARKS[1]:g} seconds of its core; – where "
+        "runs were shorter,",
+        "or there was no tree yet. *Voxels*: sizes of the voxelizations that seeds take in turn,",
+        "from roomy to full ones; *voxels of the best*: joined by the best tree at the end of a",
+        "run, the median.",
+        "",
         "*Proven*, *sampled*: smallest gap of all trees of the row by the swept test, and seen by",
         "the other check. *Best certified*: of the best trees that were put to the proof (where",
         "one is refused, the next best). *Refused*: trees that fold as cubes and not as bodies.",
@@ -280,13 +330,13 @@ def table(data: dict[str, Any], facts: dict[str, Any]) -> str:
     ]
     for title, names in (("The paper's models", PAPER), ("Ten other models", DEV)):
         rows = [
-            row(name, joints, data[name][joints], marks)
+            row(name, joints, data[name][joints])
             for name in names
             if name in data
             for joints in data[name]
         ]
         if rows:
-            lines += ["", f"## {title}", "", *head(marks), *rows]
+            lines += ["", f"## {title}", "", *head(), *rows]
     lines += compared(data) + refusals(data)
     return "\n".join(lines) + "\n"
 
@@ -297,7 +347,9 @@ def main() -> None:
     )
     parser.add_argument("--models", nargs="+", default=["paper"], help="names, paper, dev, or all")
     parser.add_argument("--seeds", nargs="+", type=int, default=list(SEEDS))
-    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument(
+        "--seconds", type=float, default=CORE_MARKS[-1], help="processor seconds of each run"
+    )
     parser.add_argument("--joints", nargs="+", default=["S"], choices=["S", "S+D"])
     parser.add_argument("--work", type=Path, default=Path("search-runs"))
     parser.add_argument("--workers", type=int, default=2, help="runs side by side")

@@ -194,8 +194,7 @@ class Kit:
         """
         if self.recipe.pick:
             return [self._picked().candidate]
-        _voxels, candidates = next(self._rounds().found())
-        return candidates
+        return [candidate for _, candidate in next(self._rounds().found())]
 
     def fold(self) -> Attempt:
         """Best tree with its folding path, planned on the lattice (paper section 5)."""
@@ -402,8 +401,8 @@ class Kit:
             tree, path = picked.candidate.tree, picked.candidate.path
             yield Attempt(picked.voxels, tree, motion_of(tree, path))
             return
-        for voxels, candidates in self._rounds().found():
-            for candidate in candidates:
+        for pairs in self._rounds().found():
+            for voxels, candidate in pairs:
                 yield Attempt(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
 
     def _build(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from fabfold.errors import NoFoldError, NoTreeError, RecipeError
 from fabfold.progress import Progress
 from fabfold.search import Budget, Tally, executor, run_seeds
-from fabfold.seeds import Event, Job
+from fabfold.seeds import Event, Job, SeedResult
 from fabfold.tree.solve import Candidate
 from fabfold.voxels.model import Voxels
 
@@ -129,7 +129,9 @@ def solutions(
     ]
     why = ""
     fits = False
-    most = min(recipe.rounds, _STEP // ladder[0].seeds_per_round)
+    from fabfold.rounds import SEEDS_PER_ROUND
+
+    most = min(recipe.rounds, _STEP // SEEDS_PER_ROUND)
     for number in range(most):
         found, fitted, reason = _round(ladder, number, listening, workers, scheduler)
         fits, why = fits or fitted, why or reason
@@ -172,13 +174,10 @@ def _round(
     results = {seed: result for batch in batches for seed, result in batch.known.items()}
     if len(results) < len(owner):
 
-        def tasks() -> Iterator[tuple[int, Job]]:
-            for batch in batches:
-                todo = [seed for seed in batch.keys if seed not in results]
-                job = batch.job() if todo else None
-                for seed in todo:
-                    if job is not None:
-                        yield seed, job
+        def tasks() -> Iterator[tuple[int, Job | SeedResult]]:
+            for seed, step in owner.items():
+                if seed not in results:
+                    yield seed, ladder[step].job(seed)
 
         with listening(f"pareto-{number}") as progress:
             tally = Tally(progress, results, lambda done: done / len(owner), len(owner))
@@ -195,7 +194,8 @@ def _round(
             results = tally.results
     found = []
     for seed in sorted(owner):
-        rounds, voxels = ladder[owner[seed]], batches[owner[seed]].voxels
+        rounds = ladder[owner[seed]]
+        voxels = rounds.voxels(seed)
         for candidate in rounds.closed(results[seed].candidates):
             found.append(_solution(rounds, voxels, candidate))
     fitted = any(result.fits for result in results.values())

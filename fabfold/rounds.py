@@ -1,11 +1,10 @@
-"""Rounds of the search: seeds by the handful, one voxelization after the other."""
+"""Rounds of the search: seeds by the handful, each with the next voxelization."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Any
 
 from fabfold.errors import NoFoldError, NoTreeError, RecipeError
@@ -15,7 +14,15 @@ from fabfold.fold.foldability import LatticeFoldability
 from fabfold.lattice import Template
 from fabfold.progress import Progress
 from fabfold.recipe import Recipe
-from fabfold.search import Budget, Tally, best_first, executor, run_seeds, search, warm_up
+from fabfold.search import (
+    Budget,
+    Tally,
+    executor,
+    require_fit,
+    run_seeds,
+    search_tasks,
+    warm_up,
+)
 from fabfold.seeds import Event, Job, SeedResult
 from fabfold.shelf import Shelf
 from fabfold.store import StageStore, stage_key
@@ -30,23 +37,23 @@ from fabfold.wishes import weights_of, wished
 
 __all__ = ["Rounds", "search_order"]
 
-#: Seeds in one round; constants, so that results do not depend on the workers.
+#: Seeds in one round; a constant, so that results do not depend on the workers.
 SEEDS_PER_ROUND = 4
-SEEDS_PER_LARGE_ROUND = 2
-#: Templates of more cells are large: a search takes minutes, and a full template seldom folds.
+#: Templates of more cells are large: near misses are locked by more than corners.
 LARGE = 72
-#: Share of a large template that a voxelization leaves free to be searched first.
-ROOM = 0.06
 #: Distance of the search's first seeds for recipe seeds that follow each other: more than
 #: any recipe's rounds use, so that two recipes share none.
 SEED_STRIDE = 10_000
 
 
-def search_order(options: Sequence[Voxels], cells: int) -> list[Voxels]:
-    """Order of search: best first, but those that leave a large template some room before."""
-    if cells <= LARGE:
-        return list(options)
-    return sorted(options, key=lambda voxels: len(voxels) > (1.0 - ROOM) * cells)
+def search_order(options: Sequence[Voxels]) -> list[Voxels]:
+    """Order in which seeds take voxelizations: from the fewest voxels to the most, and again.
+
+    What leaves much of the template free folds within seconds; what fills it better has to beat
+    that. Of each two neighbours in size one comes in the first turn, the other in the second.
+    """
+    ordered = sorted(options, key=len)
+    return ordered[0::2] + ordered[1::2]
 
 
 def _usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> list[Voxels]:
@@ -76,11 +83,15 @@ def _usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> li
                 "on the surface"
             )
         options = roomy
-    ordered = search_order(options, len(template))
+    ordered = search_order(options)
     if wishes.regions:
         found = [(voxels, features(voxels)) for voxels in ordered]
         ordered = [ordered[index] for index in rank_by_cuts(wishes, found, template)]
     return ordered
+
+
+#: A tree that folds, and the voxels that it joins.
+Found = tuple[Voxels, Candidate]
 
 
 @dataclass(frozen=True)
@@ -89,19 +100,14 @@ class Batch:
 
     Attributes
     ----------
-    voxels : Voxels
     keys : dict of int to str
         Seeds, and the digest of all that each one's result depends on.
     known : dict of int to SeedResult
         Those that are done.
-    job : callable
-        Makes what the seeds share.
     """
 
-    voxels: Voxels
     keys: dict[int, str]
     known: dict[int, SeedResult]
-    job: Callable[[], Job]
 
 
 class Rounds:
@@ -112,8 +118,7 @@ class Rounds:
     recipe : Recipe
     template : Template
     options : sequence of Voxels
-        Voxelizations, best first; each round searches the next one, with those first that
-        leave a large template some room.
+        Voxelizations; each seed searches the next one, see :func:`search_order`.
     key : str
         Digest of all that `options` depend on.
     store : StageStore
@@ -157,18 +162,14 @@ class Rounds:
         self._key = key
         self._shelf = Shelf(store)
         self._listening = listening
-        self._done: dict[int, list[Candidate]] = {}
-        self._ranked: list[tuple[Voxels, Candidate]] | None = None
+        self._jobs: dict[tuple[int, bool], Job | SeedResult] = {}
+        self._done: dict[int, list[Found]] = {}
+        self._ranked: list[Found] | None = None
 
-    @property
-    def seeds_per_round(self) -> int:
-        """Seeds that one round searches."""
-        return SEEDS_PER_LARGE_ROUND if len(self.template) > LARGE else SEEDS_PER_ROUND
+    def found(self) -> Iterator[list[Found]]:
+        """Trees that fold with the voxels that they join, best first, round by round.
 
-    def found(self) -> Iterator[tuple[Voxels, list[Candidate]]]:
-        """Rounds that found trees that fold, with the voxelization that they join.
-
-        With a budget in seconds, the trees of all rounds best first instead.
+        With a budget in seconds, those of all rounds together instead.
 
         Raises
         ------
@@ -178,27 +179,25 @@ class Rounds:
             At the end, if trees fitted but none folded.
         """
         if self.seconds is not None:
-            for _, group in groupby(self.ranked(self.seconds), key=lambda pair: id(pair[0])):
-                pairs = list(group)
-                yield pairs[0][0], [candidate for _, candidate in pairs]
+            yield self.ranked(self.seconds)
             return
         fits = found = False
         why = ""
         for number in range(self.recipe.rounds):
             try:
-                candidates = self._round(number)
+                pairs = self._round(number)
             except NoTreeError as error:
                 why = why or str(error)
                 continue
             fits = True
-            if candidates:
+            if pairs:
                 found = True
-                yield self._voxels(number), candidates
+                yield pairs
         if not fits:
             raise NoTreeError(why)
         if not found:
             raise NoFoldError(
-                f"no tree that folds in {self.recipe.rounds} rounds of {self.seeds_per_round} "
+                f"no tree that folds in {self.recipe.rounds} rounds of {SEEDS_PER_ROUND} "
                 "seeds; try --effort thorough, more --rounds, another --seed or a larger template"
                 + self._about_wishes()
             )
@@ -220,7 +219,7 @@ class Rounds:
             for _, candidate in self.ranked(self.seconds)
         ]
 
-    def ranked(self, seconds: float) -> list[tuple[Voxels, Candidate]]:
+    def ranked(self, seconds: float) -> list[Found]:
         """Every tree that folds, best first, found in `seconds` or in earlier runs.
 
         Raises
@@ -230,14 +229,7 @@ class Rounds:
         """
         if self._ranked is None:
             results = self._search_for(seconds)
-            count = self.seeds_per_round
-            first = self._seeds(0)[0]
-            pairs = [
-                (self._voxels((seed - first) // count), candidate)
-                for seed in sorted(results)
-                for candidate in self.closed(results[seed].candidates)
-            ]
-            self._ranked = sorted(pairs, key=lambda pair: pair[1].energy["total"])
+            self._ranked = self._paired(results)
             if results and not any(result.fits for result in results.values()):
                 raise NoTreeError(results[min(results)].why)
         if not self._ranked:
@@ -251,7 +243,7 @@ class Rounds:
         """Results of all rounds that there is time for, and of earlier runs."""
         keys: dict[int, str] = {}
         known: dict[int, SeedResult] = {}
-        rounds = SEED_STRIDE // self.seeds_per_round
+        rounds = SEED_STRIDE // SEEDS_PER_ROUND
         for number in range(rounds):
             fresh = self._keys(number)
             held = self._shelf.known(fresh)
@@ -260,25 +252,22 @@ class Rounds:
             keys |= fresh
             known |= held
 
-        def tasks() -> Iterator[tuple[int, Job]]:
-            given = bool(known)
+        def searchable() -> bool:
+            """Whether any voxelization can be searched at all."""
+            jobs = any(isinstance(job, Job) for job in self._jobs.values())
+            return jobs or any(result.fits for result in tally.results.values())
+
+        def tasks() -> Iterator[tuple[int, Job | SeedResult]]:
             for number in range(rounds):
                 tally.check_failures()
                 keys.update(self._keys(number))
-                job: Job | None = None
                 for seed in self._seeds(number):
                     cut = known[seed].cut if seed in known else 0.0
                     # With no more time than it had before, a seed would not come further.
                     if cut is not None and cut < seconds:
-                        try:
-                            job = job or self._job(number)
-                        except NoTreeError:
-                            # Another voxelization may do; where none does, the first says why.
-                            if number + 1 >= len(self.options) and not given:
-                                raise
-                            break
-                        given = True
-                        yield seed, job
+                        yield seed, self.job(seed)
+                if number * SEEDS_PER_ROUND >= len(self.options) and not searchable():
+                    return
 
         if seconds <= 0:
             return known
@@ -291,24 +280,37 @@ class Rounds:
                     tally.hear(self._shelf.keep(event, keys[event.seed], seconds))
 
                 progress.update(None, "getting ready")
-                warm_up(pool)
+                warm_up(pool, self.recipe.joints)
                 budget.restart()
                 run_seeds(pool, tasks(), hear, budget.over)
         tally.check_failures()
         return tally.results
 
-    def _voxels(self, number: int) -> Voxels:
-        return self.options[number % len(self.options)]
+    def _option(self, seed: int) -> int:
+        """Number of the voxelization that a seed searches."""
+        return (seed - self._seeds(0)[0]) % len(self.options)
+
+    def voxels(self, seed: int) -> Voxels:
+        """The voxelization that a seed searches."""
+        return self.options[self._option(seed)]
+
+    def _paired(self, results: Mapping[int, SeedResult]) -> list[Found]:
+        """Trees of all seeds that can be folded to the end, best first."""
+        pairs = [
+            (self.voxels(seed), candidate)
+            for seed in sorted(results)
+            for candidate in self.closed(results[seed].candidates)
+        ]
+        return sorted(pairs, key=lambda pair: pair[1].energy["total"])
 
     def _seeds(self, number: int) -> range:
-        count = self.seeds_per_round
-        first = self.recipe.seed * SEED_STRIDE + self._shift + number * count
-        return range(first, first + count)
+        first = self.recipe.seed * SEED_STRIDE + self._shift + number * SEEDS_PER_ROUND
+        return range(first, first + SEEDS_PER_ROUND)
 
     def _keys(self, number: int) -> dict[int, str]:
         """Digest of all that each seed of a round depends on."""
         recipe = self.recipe
-        about = [recipe.surface_weight, recipe.single_weight, recipe.effort, number]
+        about = [recipe.surface_weight, recipe.single_weight, recipe.effort, self._carves(number)]
         about += wished(recipe)
         return {seed: stage_key(self._key, *about, seed) for seed in self._seeds(number)}
 
@@ -316,70 +318,78 @@ class Rounds:
         """The seeds of a round."""
         keys = self._keys(number)
         whole = {s: r for s, r in self._shelf.known(keys).items() if r.cut is None}
-        return Batch(self._voxels(number), keys, whole, lambda: self._job(number))
+        return Batch(keys, whole)
 
     def keep(self, event: Event, key: str) -> None:
         """Keep what a seed of a batch tells."""
         self._shelf.keep(event, key)
 
-    def _job(self, number: int) -> Job:
-        voxels = self._voxels(number)
+    def job(self, seed: int) -> Job | SeedResult:
+        """What a seed searches, or its result where its voxelization rules every tree out."""
+        number = (seed - self._seeds(0)[0]) // SEEDS_PER_ROUND
+        kind = (self._option(seed), self._carves(number))
+        if self.template.creases:
+            return self._made(seed, kind[1])  # the faces of the parts depend on the seed
+        if kind not in self._jobs:
+            self._jobs[kind] = self._made(seed, kind[1])
+        return self._jobs[kind]
+
+    def _made(self, seed: int, carves: bool) -> Job | SeedResult:
+        voxels = self.voxels(seed)
         joints = features(voxels)
         uncut = self.wishes.uncut(voxels, joints, self.template)
-        problem = from_features(
-            voxels,
-            joints,
-            self.template,
-            weights_of(self.recipe),
-            bias=self.wishes.bias(voxels, self.template),
-            stiff=uncut_pairs(uncut, joints),
-            joints=self.recipe.joints,
-            share=self.recipe.share,
-        )
-        problem = self.wishes.apply(problem, voxels, self.template)
-        if self.template.creases:
-            problem = parted(problem, self._seeds(number)[0], joints.depth)
-        return Job(problem, self._judge(number, voxels), EFFORTS[self.recipe.effort])
+        try:
+            problem = from_features(
+                voxels,
+                joints,
+                self.template,
+                weights_of(self.recipe),
+                bias=self.wishes.bias(voxels, self.template),
+                stiff=uncut_pairs(uncut, joints),
+                joints=self.recipe.joints,
+                share=self.recipe.share,
+            )
+            problem = self.wishes.apply(problem, voxels, self.template)
+            if self.template.creases:
+                problem = parted(problem, seed, joints.depth)
+        except NoTreeError as error:
+            return SeedResult((), fits=False, why=str(error))
+        judge = LatticeFoldability()
+        if carves:
+            judge = LatticeFoldability(carve=CORE, material=voxels.subvoxels)
+        return Job(problem, judge, EFFORTS[self.recipe.effort])
 
-    def _judge(self, number: int, voxels: Voxels) -> LatticeFoldability:
-        """Whole cells count at first; where they do not fold, every second round lets them be cut.
+    def _carves(self, number: int) -> bool:
+        """Whether cells may be cut in this round: where whole ones do not fold, every second one.
 
         On large templates near misses are locked by more than corners: it would only cost time.
         """
-        if number % 2 == 0 or len(self.template) > LARGE or self.template.creases:
-            return LatticeFoldability()
-        return LatticeFoldability(carve=CORE, material=voxels.subvoxels)
+        return number % 2 == 1 and len(self.template) <= LARGE and not self.template.creases
 
-    def _round(self, number: int) -> list[Candidate]:
+    def _round(self, number: int) -> list[Found]:
         if number in self._done:
             return self._done[number]
         keys = self._keys(number)
-        known = {
+        results: Mapping[int, SeedResult] = {
             seed: result for seed, result in self._shelf.known(keys).items() if result.cut is None
         }
 
         def hear(event: Event) -> None:
             self._shelf.keep(event, keys[event.seed])
 
-        if len(known) == len(keys):
-            candidates = best_first(self._seeds(number), known)
-        else:
+        if len(results) < len(keys):
             with self._listening(f"fit-{number}") as progress:
-                job = self._job(number)
-                candidates = search(
-                    job.problem,
-                    self._seeds(number),
-                    job.foldability,
-                    job.effort,
+                results = search_tasks(
+                    {seed: self.job(seed) for seed in keys},
                     workers=self.workers,
                     scheduler=self.scheduler,
                     progress=progress,
-                    known=known,
+                    known=results,
                     hear=hear,
                 )
-        candidates = self.closed(candidates)
-        self._done[number] = candidates
-        return candidates
+        require_fit([results[seed] for seed in keys])
+        self._done[number] = self._paired(results)
+        return self._done[number]
 
     def closed(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Those that can be folded along the template's creases too, where it has any."""

@@ -12,28 +12,26 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
-
-import numpy as np
 
 from fabfold.errors import NoTreeError, RecipeError, WorkerError
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.lattice import load_template
 from fabfold.progress import Progress, SilentProgress
 from fabfold.seeds import Better, Done, Event, Executor, Job, SeedResult
-from fabfold.tree.effort import EFFORTS, Effort
+from fabfold.tree.catalogue import JointSet
+from fabfold.tree.effort import Effort
 from fabfold.tree.foldability import Foldability
-from fabfold.tree.problem import TreeProblem, tree_problem
+from fabfold.tree.problem import TreeProblem
 from fabfold.tree.solve import Candidate
+from fabfold.warming import strip_job
 
 __all__ = [
     "Budget",
     "SeedResult",
     "Tally",
-    "best_first",
     "executor",
+    "require_fit",
     "run_seeds",
     "search",
+    "search_tasks",
     "warm_up",
 ]
 
@@ -122,7 +120,7 @@ def executor(
 
 def run_seeds(
     pool: Executor,
-    tasks: Iterable[tuple[int, Job]],
+    tasks: Iterable[tuple[int, Job | SeedResult]],
     hear: Callable[[Event], None],
     over: Callable[[], bool],
 ) -> None:
@@ -135,15 +133,15 @@ def run_seeds(
     Parameters
     ----------
     pool : Executor
-    tasks : iterable of (int, Job)
-        Taken as workers become free; may be endless.
+    tasks : iterable of (int, Job or SeedResult)
+        Taken as workers become free; may be endless. Where there is nothing to search, the result.
     hear : callable
         Told of each :class:`Better` and each :class:`Done`.
     over : callable
         Polled often.
     """
     waiting = iter(tasks)
-    again: list[tuple[int, Job]] = []
+    again: list[tuple[int, Job | SeedResult]] = []
     running: dict[int, Job] = {}
     best: dict[int, Candidate] = {}
     losses: Counter[int] = Counter()
@@ -175,6 +173,9 @@ def run_seeds(
             task = again.pop(0) if again else next(waiting, None)
             if task is None:
                 break
+            if isinstance(task[1], SeedResult):
+                hear(Done(task[0], task[1]))
+                continue
             running[task[0]] = task[1]
             pool.submit(task[1], task[0])
         if not running and (told is not None or not again):
@@ -187,22 +188,12 @@ def run_seeds(
         hear(Done(seed, SeedResult(found, why="no time left", cut=0.0)))
 
 
-def warm_up(pool: Executor) -> None:
+def warm_up(pool: Executor, joints: JointSet = "S") -> None:
     """Have each worker load the compiled kernels, so that a budget is spent on the search.
 
     After an installation that takes a minute, for they are compiled first; later a second.
     """
-    cells = np.array([(i, 0, 0) for i in range(8)], np.int32)
-    count = len(cells) - 1
-    problem = tree_problem(
-        cells,
-        load_template("box-2x2x2"),
-        pairs=np.array([(i, i + 1) for i in range(count)], np.int32),
-        rigid=np.ones(count, np.bool_),
-        hinge=np.ones((count, 4), np.bool_),
-        depth=np.zeros((len(cells), 6)),
-    )
-    job = Job(problem, LatticeFoldability(), replace(EFFORTS["quick"], restarts=2, polishing=20))
+    job = strip_job(joints)
     forever = Budget()
     run_seeds(pool, [(seed, job) for seed in range(pool.free())], lambda _event: None, forever.over)
 
@@ -275,6 +266,57 @@ class Tally:
             )
 
 
+def search_tasks(
+    tasks: Mapping[int, Job | SeedResult],
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    known: Mapping[int, SeedResult] | None = None,
+    hear: Callable[[Event], None] | None = None,
+) -> dict[int, SeedResult]:
+    """Results of all seeds.
+
+    Parameters
+    ----------
+    tasks : mapping of int to Job or SeedResult
+        What each seed searches, or its result where there is nothing to search. Jobs must pickle
+        where there is more than one worker.
+    workers : int, optional
+        Processes; default one a core. One works in this process. Changes no result.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers run the seeds instead. Changes no result.
+    progress : Progress, optional
+        Hears of each finished seed and the best so far.
+    known : mapping of int to SeedResult, optional
+        Seeds that are done already.
+    hear : callable, optional
+        Told of each better tree, and of each seed that ends, so that they can be kept.
+
+    Raises
+    ------
+    WorkerError
+        If every seed failed, or the cluster is gone.
+    """
+    known = {seed: result for seed, result in (known or {}).items() if seed in tasks}
+    tally = Tally(
+        progress or SilentProgress(), known, lambda done: done / max(1, len(tasks)), len(tasks)
+    )
+    todo = [(seed, task) for seed, task in tasks.items() if seed not in known]
+    if todo:
+
+        def each(event: Event) -> None:
+            if hear is not None:
+                hear(event)
+            tally.hear(event)
+
+        forever = Budget()
+        with executor(workers, scheduler, len(todo), forever.over) as pool:
+            run_seeds(pool, todo, each, forever.over)
+    tally.check_failures()
+    return tally.results
+
+
 def search(
     problem: TreeProblem,
     seeds: Sequence[int],
@@ -287,25 +329,16 @@ def search(
     known: Mapping[int, SeedResult] | None = None,
     hear: Callable[[Event], None] | None = None,
 ) -> list[Candidate]:
-    """Trees that fold from all seeds, best first.
+    """Trees that fold from all seeds of one problem, best first.
 
     Parameters
     ----------
     problem : TreeProblem
     seeds : sequence of int
     foldability : Foldability
-        Must pickle where there is more than one worker.
     effort : Effort
-    workers : int, optional
-        Processes; default one a core. One works in this process. Changes no result.
-    scheduler : str, optional
-        Address of a Dask scheduler whose workers run the seeds instead. Changes no result.
-    progress : Progress, optional
-        Hears of each finished seed and the best so far.
-    known : mapping of int to SeedResult, optional
-        Seeds that are done already.
-    hear : callable, optional
-        Told of each better tree, and of each seed that ends, so that they can be kept.
+    workers, scheduler, progress, known, hear
+        See :func:`search_tasks`.
 
     Returns
     -------
@@ -319,36 +352,28 @@ def search(
     WorkerError
         If every seed failed, or the cluster is gone.
     """
-    known = {seed: (known or {})[seed] for seed in seeds if seed in (known or {})}
-    tally = Tally(
-        progress or SilentProgress(), known, lambda done: done / max(1, len(seeds)), len(seeds)
+    job = Job(problem, foldability, effort)
+    results = search_tasks(
+        dict.fromkeys(seeds, job),
+        workers=workers,
+        scheduler=scheduler,
+        progress=progress,
+        known=known,
+        hear=hear,
     )
-    todo = [seed for seed in seeds if seed not in known]
-    if todo:
-
-        def each(event: Event) -> None:
-            if hear is not None:
-                hear(event)
-            tally.hear(event)
-
-        job = Job(problem, foldability, effort)
-        forever = Budget()
-        with executor(workers, scheduler, len(todo), forever.over) as pool:
-            run_seeds(pool, [(seed, job) for seed in todo], each, forever.over)
-    tally.check_failures()
-    return best_first(seeds, tally.results)
+    ordered = [results[seed] for seed in seeds]
+    require_fit(ordered)
+    merged = [candidate for result in ordered for candidate in result.candidates]
+    return sorted(merged, key=lambda candidate: candidate.energy["total"])
 
 
-def best_first(seeds: Sequence[int], results: Mapping[int, SeedResult]) -> list[Candidate]:
-    """Candidates of all seeds by ascending energy, then seed.
+def require_fit(results: Sequence[SeedResult]) -> None:
+    """Raise where no seed found any tree that fits the template.
 
     Raises
     ------
     NoTreeError
-        If no seed found any tree that fits the template.
+        With the first seed's reason.
     """
-    ordered = [results[seed] for seed in seeds]
-    if ordered and not any(result.fits for result in ordered):
-        raise NoTreeError(ordered[0].why)
-    merged = [candidate for result in ordered for candidate in result.candidates]
-    return sorted(merged, key=lambda candidate: candidate.energy["total"])
+    if results and not any(result.fits for result in results):
+        raise NoTreeError(results[0].why)

@@ -20,6 +20,8 @@ from .stops import Detents, Stops
 from .train import Train, groove, lay_out
 
 __all__ = [
+    "BarrelOptions",
+    "BarrelSpec",
     "HalfPlan",
     "SinglePlan",
     "SingleSpec",
@@ -54,25 +56,74 @@ class HalfPlan:
     bore: tuple[Shape, ...] = ()
 
 
-@dataclass(frozen=True)
-class SingleSpec:
-    """All parameters of a single hinge, defaults filled in; see :class:`hinges.SingleHinge`."""
+@dataclass(frozen=True, kw_only=True)
+class BarrelSpec:
+    """Parameters that single and double hinges have alike, defaults filled in."""
 
-    length: float
     knuckles: int
     radius: float
     pin: Pin
     clearance: Clearance
-    leaf: Bracket | Leaf
     gap: float
-    angle: float
-    angular_range: tuple[float, float]
-    stops: Stops | None
-    detents: Detents | None
     chamfer: float
     margin: float
     wall: float
     roof: Roof
+
+
+@dataclass(frozen=True, kw_only=True)
+class BarrelOptions:
+    """What single and double hinges may be asked for alike; see :class:`hinges.SingleHinge`."""
+
+    radius: float | None = None
+    pin: Pin | None = None
+    clearance: Clearance | float | str = "fdm"
+    gap: float | None = None
+    chamfer: float = 0.0
+    margin: float | None = None
+    wall: float | None = None
+    bore: Literal["round", "teardrop", "octagon"] = "round"
+    up: float = 90.0
+
+    def filled(self, length: float, knuckles: int, drawn: tuple[float, ...]) -> BarrelSpec:
+        """Fill in the defaults for an edge of `length` mm.
+
+        `drawn` are the angles in degrees by which the owners of knuckles stand turned. The margin
+        keeps hinges on two edges that meet at a corner clear of one another.
+        """
+        room = Clearance.read(self.clearance)
+        wall = wall_of(self.clearance) if self.wall is None else self.wall
+        radius, pin = self.radius, self.pin
+        if radius is None:
+            if pin is None:
+                radius, _ = default_radii(length, room, wall, knuckles, self.margin)
+            else:
+                radius = max(2.0, 0.1 * -floor(-10.0 * pin.thinnest_barrel(room, wall, knuckles)))
+        if pin is None:
+            pin = ConePin(max(default_pin_radius(radius, room, wall), 0.3))
+        return BarrelSpec(
+            knuckles=knuckles,
+            radius=float(radius),
+            pin=pin,
+            clearance=room,
+            gap=room.radial if self.gap is None else float(self.gap),
+            chamfer=float(self.chamfer),
+            margin=radius + room.radial if self.margin is None else float(self.margin),
+            wall=wall,
+            roof=Roof(self.bore, tuple(self.up - angle for angle in drawn)),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SingleSpec(BarrelSpec):
+    """All parameters of a single hinge, defaults filled in; see :class:`hinges.SingleHinge`."""
+
+    length: float
+    leaf: Bracket | Leaf
+    angle: float
+    angular_range: tuple[float, float]
+    stops: Stops | None
+    detents: Detents | None
 
     @classmethod
     def read(
@@ -80,52 +131,29 @@ class SingleSpec:
         length: float,
         *,
         knuckles: int = 3,
-        radius: float | None = None,
-        pin: Pin | None = None,
-        clearance: Clearance | float | str = "fdm",
         leaf: Bracket | Leaf | None = None,
-        gap: float | None = None,
         angle: float = 0.0,
         angular_range: tuple[float, float] = (0.0, 180.0),
         stops: Stops | bool | None = None,
         detents: Detents | None = None,
-        chamfer: float = 0.0,
-        margin: float | None = None,
-        wall: float | None = None,
-        bore: Literal["round", "teardrop", "octagon"] = "round",
-        up: float = 90.0,
+        **barrel: Any,
     ) -> SingleSpec:
-        """Fill in the defaults; parameters as for :class:`hinges.SingleHinge`."""
-        room = Clearance.read(clearance)
-        thin = wall_of(clearance) if wall is None else wall
-        if radius is None:
-            if pin is None:
-                radius, _ = default_radii(length, room, thin, knuckles, margin)
-            else:
-                radius = max(2.0, 0.1 * -floor(-10.0 * pin.thinnest_barrel(room, thin, knuckles)))
-        if pin is None:
-            pin = ConePin(max(default_pin_radius(radius, room, thin), 0.3))
-        leaf = Bracket() if leaf is None else leaf
-        if stops is True:
-            stops = Stops()
-        if margin is None:
-            margin = radius + room.radial if isinstance(leaf, Bracket) else 0.0
+        """Fill in the defaults; parameters as for :class:`hinges.SingleHinge`.
+
+        `barrel` are those of :class:`BarrelOptions`.
+        """
+        options = BarrelOptions(**barrel)
+        shared = dict(vars(options.filled(length, knuckles, (0.0, angle))))
+        if options.margin is None and isinstance(leaf, Leaf):
+            shared["margin"] = 0.0
         return cls(
-            float(length),
-            knuckles,
-            float(radius),
-            pin,
-            room,
-            leaf,
-            room.radial if gap is None else gap,
-            float(angle),
-            (float(angular_range[0]), float(angular_range[1])),
-            stops or None,
-            detents,
-            float(chamfer),
-            float(margin),
-            thin,
-            Roof(bore, (up, up - angle)),
+            length=float(length),
+            leaf=Bracket() if leaf is None else leaf,
+            angle=float(angle),
+            angular_range=(float(angular_range[0]), float(angular_range[1])),
+            stops=Stops() if stops is True else stops or None,
+            detents=detents,
+            **shared,
         )
 
     def with_(self, **changes: Any) -> SingleSpec:

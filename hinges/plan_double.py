@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import floor, sqrt
-from typing import Final, Literal
+from math import sqrt
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,7 @@ from .clearance import Clearance
 from .errors import HingeError
 from .fit import at_least
 from .leaf import Bracket
-from .pins import ConePin, Pin, Roof
-from .plan import HalfPlan, default_pin_radius, default_radii, wall_of
+from .plan import BarrelOptions, BarrelSpec, HalfPlan
 from .shapes import Moved, Point, Prism, Shape, box, cylinder
 from .train import Train, groove, lay_out
 
@@ -61,8 +60,8 @@ def _neck(radius: float, plate: float, clearance: Clearance, top: float | None) 
     return sqrt(along**2 + across**2)
 
 
-@dataclass(frozen=True)
-class DoubleSpec:
+@dataclass(frozen=True, kw_only=True)
+class DoubleSpec(BarrelSpec):
     """All parameters of a double hinge, defaults filled in; see :class:`hinges.DoubleHinge`."""
 
     size: float
@@ -70,17 +69,8 @@ class DoubleSpec:
     second: str
     turns: tuple[float, float]
     angles: tuple[float, float]
-    knuckles: int
-    radius: float
-    pin: Pin
-    clearance: Clearance
     plate: float
     bracket: Bracket
-    gap: float
-    chamfer: float
-    margin: float
-    wall: float
-    roof: Roof
 
     @classmethod
     def read(
@@ -92,59 +82,34 @@ class DoubleSpec:
         turns: tuple[float, float] = (180.0, 180.0),
         angles: tuple[float, float] = (0.0, 0.0),
         knuckles: int | None = None,
-        radius: float | None = None,
-        pin: Pin | None = None,
-        clearance: Clearance | float | str = "fdm",
         plate: float | None = None,
         bracket: Bracket | None = None,
-        gap: float | None = None,
-        chamfer: float = 0.0,
-        margin: float | None = None,
-        wall: float | None = None,
-        bore: Literal["round", "teardrop", "octagon"] = "round",
-        up: float = 90.0,
+        **barrel: Any,
     ) -> DoubleSpec:
-        """Fill in the defaults; parameters as for :class:`hinges.DoubleHinge`."""
-        room = Clearance.read(clearance)
-        thin = wall_of(clearance) if wall is None else wall
+        """Fill in the defaults; parameters as for :class:`hinges.DoubleHinge`.
+
+        `barrel` are those of :class:`hinges.plan.BarrelOptions`.
+        """
         if knuckles is None:
             knuckles = 5 if first == second else 3
-        if radius is None:
-            if pin is None:
-                radius, _ = default_radii(size, room, thin, knuckles, margin)
-            else:
-                radius = max(2.0, 0.1 * -floor(-10.0 * pin.thinnest_barrel(room, thin, knuckles)))
-        if pin is None:
-            pin = ConePin(max(default_pin_radius(radius, room, thin), 0.3))
-        space = room.radial if gap is None else float(gap)
+        # The bores' roofs are the same in every pose: each axis has its own direction of printing.
+        shared = BarrelOptions(**barrel).filled(size, knuckles, (0.0, 0.0, 0.0))
         if plate is None:
-            tops = [space / 2.0 if turn <= 180.0 else None for turn in turns]
-            thicknesses = (2.0, 1.8, 1.6, 1.4, 1.2)
-            plate = next(
-                (
-                    t
-                    for t in thicknesses
-                    if min(_neck(radius, t, room, top) for top in tops) >= thin
-                ),
-                2.0,
-            )
+            tops = [shared.gap / 2.0 if turn <= 180.0 else None for turn in turns]
+            necks = {
+                t: min(_neck(shared.radius, t, shared.clearance, top) for top in tops)
+                for t in (2.0, 1.8, 1.6, 1.4, 1.2)
+            }
+            plate = next((t for t, neck in necks.items() if neck >= shared.wall), 2.0)
         return cls(
-            float(size),
-            first,
-            second,
-            (float(turns[0]), float(turns[1])),
-            (float(angles[0]), float(angles[1])),
-            knuckles,
-            float(radius),
-            pin,
-            room,
-            float(plate),
-            Bracket() if bracket is None else bracket,
-            space,
-            float(chamfer),
-            radius + room.radial if margin is None else float(margin),
-            thin,
-            Roof(bore, (up, up, up)),
+            size=float(size),
+            first=first,
+            second=second,
+            turns=(float(turns[0]), float(turns[1])),
+            angles=(float(angles[0]), float(angles[1])),
+            plate=float(plate),
+            bracket=Bracket() if bracket is None else bracket,
+            **vars(shared),
         )
 
     @property

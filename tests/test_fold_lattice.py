@@ -23,7 +23,7 @@ from fabfold.fold.reference import (
     turn_overlap,
 )
 from fabfold.fold.sweep import sweep_table
-from fabfold.fold.turns import turn_is_free
+from fabfold.fold.turns import obstacles, workspace
 from fabfold.lattice import FACES
 from fabfold.tree.system import HingeSystem
 
@@ -389,4 +389,4 @@ def turn_free(system, quarters, hinge, way):
     steps = np.abs(quarters)[mech.origin].astype(np.int8)
     assert pose_scene(mech, at, steps)
     step = 1 if way * int(system.turns[hinge]) > 0 else -1
-    return bool(turn_is_free(mech, at, table, place, step))
+    return obstacles(mech, at, table, place, step, workspace(0)) == 0

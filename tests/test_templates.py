@@ -1,5 +1,7 @@
 """Template files, templates that fold once more, and meshes as targets."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 from tree_cases import solid_problem, strip
@@ -12,13 +14,15 @@ from fabfold.fold.foldability import LatticeFoldability
 from fabfold.fold.lattice import free_moves
 from fabfold.fold.motion import end_pose_error, motion_of
 from fabfold.joinery.model import Joinery
-from fabfold.lattice import load_template, template_names
+from fabfold.lattice import ROTATIONS, load_template, template_names
 from fabfold.solid.model import Solid
 from fabfold.targets import find_input, load_target, named_target
+from fabfold.tree.build import hinge_choice
 from fabfold.tree.check import check_tree
 from fabfold.tree.effort import Effort
 from fabfold.tree.parts import parted
 from fabfold.tree.solve import solve
+from fabfold.tree.starts import grow
 from fabfold.tree.system import HingeSystem, hinge_system
 from fabfold.voxels.target import template_of_solid
 
@@ -190,6 +194,29 @@ def test_a_model_folds_into_the_flat_template_and_then_shut(tmp_path):
     half = tree.target[:, 2] == tree.target[0, 2]
     crossing = [edge for edge in tree.edges if half[edge.parent] != half[edge.child]]
     assert [edge.hinges for edge in crossing] == [(crease,)]
+
+
+def test_hinges_that_meet_only_when_the_template_is_shut_clash(tmp_path):
+    thick = BOOK.replace("2, 1]", "2, 2]").replace("0, 1]", "0, 2]")
+    template = load_template(written(tmp_path, thick))
+    parts = parts_of(template)
+    cells = [(x, y, z) for x in range(4) for y in range(4) for z in range(2)]
+    problem = solid_problem(cells, written(tmp_path, thick))
+    ready = parted(problem, 3, np.zeros((32, 6)))
+    met = 0
+    for pose in islice(grow(ready, 1), 10):
+        choice = hinge_choice(ready, pose)
+        at = choice.found[:, 0]
+        local = choice.found[:, 6:9] / 2.0 - problem.source[at]
+        flat = template.cells[pose[at] // 24]
+        flat = flat + np.einsum("kij,kj->ki", ROTATIONS[pose[at] % 24], local)
+        turn = parts.poses[parts.part[pose[at] // 24]]
+        shut = np.einsum("kij,kj->ki", turn[:, :3, :3], flat) + turn[:, :3, 3]
+        same = (np.abs(shut[:, None] - shut) < 1e-9).all(axis=2)
+        number = choice.found[:, 9:12]
+        assert ((number[:, None] == number).all(axis=2) == same).all()
+        met += int((same & (np.abs(flat[:, None] - flat) > 1e-9).any(axis=2)).sum())
+    assert met > 0
 
 
 def test_voxels_that_cannot_be_shared_out_are_refused(tmp_path):

@@ -22,7 +22,8 @@ from fabfold.tree.grow import doubles_needed
 from fabfold.tree.model import FoldTree
 from fabfold.tree.problem import tree_problem
 from fabfold.tree.rng import generator
-from fabfold.tree.solve import grow, solve
+from fabfold.tree.solve import solve
+from fabfold.tree.starts import grow
 from fabfold.tree.system import HingeSystem, hinge_system
 from fabfold.tree.wedge import double_blocked, hinge_tables
 

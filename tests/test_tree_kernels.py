@@ -14,7 +14,7 @@ from fabfold.tree.problem import joint_table, tree_problem
 from fabfold.tree.rebuild import apart
 from fabfold.tree.rng import generator, random_below, random_bits, random_float
 from fabfold.tree.ruin import propose
-from fabfold.tree.solve import grow
+from fabfold.tree.starts import grow
 from fabfold.tree.wedge import half_turn_table, hinge_tables
 
 CASES = [(30, "box-3x3x4", 1), (45, "box-3x4x4", 2), (62, "box-4x4x4", 3)]

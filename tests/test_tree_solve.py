@@ -11,7 +11,8 @@ from fabfold.fold.foldability import LatticeFoldability
 from fabfold.fold.lattice import free_moves
 from fabfold.tree.check import check_tree
 from fabfold.tree.effort import EFFORTS, Effort
-from fabfold.tree.solve import grow, solve
+from fabfold.tree.solve import solve
+from fabfold.tree.starts import grow
 from fabfold.tree.system import hinge_system
 
 QUICK = Effort(polishing=100, restarts=10)

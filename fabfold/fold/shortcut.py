@@ -10,9 +10,26 @@ from numpy.typing import NDArray
 
 from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, pose_scene
 from fabfold.fold.sweep import SweepTable
-from fabfold.fold.turns import obstacles, turn_is_free, workspace
+from fabfold.fold.turns import Work, obstacles, workspace
 
 __all__ = ["cuts_on", "follow", "shorten"]
+
+
+@njit(cache=True)
+def _met(
+    mech: Mechanism,
+    at: Scene,
+    table: SweepTable,
+    q: NDArray[np.int8],
+    step: NDArray[np.int16],
+    work: Work,
+) -> int:
+    """Pairs that hinder a step from state `q`; -1 where the state itself is not valid."""
+    count = -1
+    if pose_scene(mech, at, q):
+        count = obstacles(mech, at, table, step[0], step[1], work)
+    clear_scene(mech, at)
+    return count
 
 
 @njit(cache=True)
@@ -30,14 +47,11 @@ def follow(
     int
         Steps made: ``len(path)`` when all of them are free.
     """
+    work = workspace(0)
     for i in range(len(path)):
         k = path[i, 0]
         step = q[k] + path[i, 1]
-        if step < 0 or step > mech.steps[k]:
-            return i
-        free = pose_scene(mech, at, q) and turn_is_free(mech, at, table, k, path[i, 1])
-        clear_scene(mech, at)
-        if not free:
+        if step < 0 or step > mech.steps[k] or _met(mech, at, table, q, path[i], work) != 0:
             return i
         q[k] = step
     return len(path)
@@ -51,16 +65,16 @@ def cuts_on(
     q: NDArray[np.int8],
     path: NDArray[np.int16],
 ) -> int:
-    """Pairs of a cell and one in its way that whole cells would meet on a path from `q`."""
+    """Pairs of a cell and one in its way that whole cells would meet on a path from `q`.
+
+    The path leads through valid states, as one that :func:`follow` made to its end.
+    """
     now = q.copy()
     work = workspace(256)
     total = 0
     for i in range(len(path)):
-        k = path[i, 0]
-        pose_scene(mech, at, now)
-        total += obstacles(mech, at, whole, k, path[i, 1], work)
-        clear_scene(mech, at)
-        now[k] += path[i, 1]
+        total += _met(mech, at, whole, now, path[i], work)
+        now[path[i, 0]] += path[i, 1]
     return total
 
 

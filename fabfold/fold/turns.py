@@ -19,7 +19,6 @@ __all__ = [
     "count_stuck",
     "movable_hinges",
     "obstacles",
-    "turn_is_free",
     "workspace",
     "world_turn",
 ]
@@ -90,6 +89,22 @@ def _barrel_pair(
 
 
 @njit(cache=True)
+def _to_first_quadrant(x: int, y: int) -> tuple[int, int, int, int, int, int]:
+    """A point turned by quarters into x > 0, y >= 0, and the rows of the turn back.
+
+    What the table says of the turned point stands at ``(c, d)``; in place that is
+    ``(c * ux + d * uy, c * vx + d * vy)``.
+    """
+    if x > 0 and y >= 0:
+        return x, y, 1, 0, 0, 1
+    if y > 0:
+        return y, -x, 0, -1, 1, 0
+    if x < 0:
+        return -x, -y, -1, 0, 0, -1
+    return -y, x, 0, 1, -1, 0
+
+
+@njit(cache=True)
 def _inside(side: int, at: NDArray[np.int64]) -> bool:
     return min(at[0], at[1], at[2]) >= 0 and max(at[0], at[1], at[2]) < 2 * side
 
@@ -123,15 +138,7 @@ def _plate_obstacles(  # noqa: PLR0911, PLR0912, PLR0915 - one plate, met by thi
         u, v = v, u
     x = at.face[p, 1 + u] - pivot[u]
     y = at.face[p, 1 + v] - pivot[v]
-    # Turn the plate into the first quadrant; (ux, uy), (vx, vy) turn what it meets back.
-    if x > 0 and y >= 0:
-        ux, uy, vx, vy = 1, 0, 0, 1
-    elif y > 0:
-        x, y, ux, uy, vx, vy = y, -x, 0, -1, 1, 0
-    elif x < 0:
-        x, y, ux, uy, vx, vy = -x, -y, -1, 0, 0, -1
-    else:
-        x, y, ux, uy, vx, vy = -y, x, 0, 1, -1, 0
+    x, y, ux, uy, vx, vy = _to_first_quadrant(x, y)
     if x * x + y * y >= 4 * table.side * table.side:
         return count  # farther out than anything that moves
     middle[axis] = at.face[p, 1 + axis]
@@ -272,10 +279,7 @@ def obstacles(  # noqa: PLR0912, PLR0915 - one pass, kept whole for speed
             for i in range(table.start[entry], table.start[entry + 1]):
                 owner = at.grid[base + table.cells[i, 0] * sa + table.cells[i, 1] * sb]
                 if owner != 0 and (owner - 1 < low or owner - 1 >= high):
-                    if count < len(found):
-                        found[count, 0] = body
-                        found[count, 1] = owner - 1
-                    count += 1
+                    count = _noted(found, count, body, owner - 1)
                     if count >= limit:
                         return count
     for e in range(len(at.edge)):
@@ -284,15 +288,7 @@ def obstacles(  # noqa: PLR0912, PLR0915 - one pass, kept whole for speed
             continue
         x = at.edge[e, 1 + u] - pivot[u]
         y = at.edge[e, 1 + v] - pivot[v]
-        # Turn the edge into the first quadrant; (ux, uy), (vx, vy) turn what it meets back.
-        if x > 0 and y >= 0:
-            ux, uy, vx, vy = 1, 0, 0, 1
-        elif y > 0:
-            x, y, ux, uy, vx, vy = y, -x, 0, -1, 1, 0
-        elif x < 0:
-            x, y, ux, uy, vx, vy = -x, -y, -1, 0, 0, -1
-        else:
-            x, y, ux, uy, vx, vy = -y, x, 0, 1, -1, 0
+        x, y, ux, uy, vx, vy = _to_first_quadrant(x, y)
         entry = x * 2 * table.side + y
         middle[axis] = at.edge[e, 1 + axis]
         for i in range(table.edge_start[entry], table.edge_start[entry + 1]):
@@ -306,11 +302,9 @@ def obstacles(  # noqa: PLR0912, PLR0915 - one pass, kept whole for speed
                 along = u if c % 2 != 0 else v
             other = at.edges[edge_slot(side, along, middle[0], middle[1], middle[2])] - 1
             if other >= 0 and (other < k or other + 1 >= high):
-                if count < len(found):
-                    found[count, 0] = mech.up[g]
-                    inside = other + 1 <= low < mech.end[other]
-                    found[count, 1] = other + 1 if inside else mech.up[other]
-                count += 1
+                inside = other + 1 <= low < mech.end[other]
+                met = other + 1 if inside else mech.up[other]
+                count = _noted(found, count, mech.up[g], met)
                 if count >= limit:
                     return count
     for p in range(len(at.face)):
@@ -318,12 +312,6 @@ def obstacles(  # noqa: PLR0912, PLR0915 - one pass, kept whole for speed
         if count >= limit:
             return count
     return count
-
-
-@njit(cache=True)
-def turn_is_free(mech: Mechanism, at: Scene, table: SweepTable, k: int, way: int) -> bool:
-    """Whether hinge `k` can make its next step without a collision, ending in a valid state."""
-    return obstacles(mech, at, table, k, way, workspace(0)) == 0
 
 
 @njit(cache=True)

@@ -141,6 +141,50 @@ def carve(
     return _Bench(voxels, tree, model, halves, voxel_mm, clearance_mm).work(planned)
 
 
+@dataclass(frozen=True)
+class _Side:
+    """One of two cells that meet, and the rings and slabs in which both are looked at.
+
+    Attributes
+    ----------
+    voxel : int
+    frame : (3, 4) float64 array
+        From shape A, in mm, to where the axis of the meeting is z.
+    rings, level : (r + 1,), (s + 1,) float64 arrays
+        Radii of the rings and heights of the slabs in mm.
+    ahead : bool
+        Whether the cell gives way ahead of the other, or behind it.
+    """
+
+    voxel: int
+    frame: Floats
+    rings: Floats
+    level: Floats
+    ahead: bool
+
+    def beyond(self, limit: Floats, wider: float) -> manifold3d.Manifold | None:
+        """What lies ahead of (or behind) the limits (slabs, rings), wider all around; shape A."""
+        import manifold3d
+
+        parts = []
+        k = 0
+        while k < len(limit):
+            last = k
+            while last + 1 < len(limit) and np.array_equal(limit[last + 1], limit[k]):
+                last += 1
+            section = _section(self.rings, limit[k], self.ahead)
+            if section is not None:
+                if wider > 0.0:
+                    section = section.offset(wider, manifold3d.JoinType.Round, 2.0, 24)
+                height = self.level[last + 1] - self.level[k] + 2 * wider
+                parts.append(section.extrude(height).translate((0.0, 0.0, self.level[k] - wider)))
+            k = last + 1
+        if not parts:
+            return None
+        whole = manifold3d.Manifold.batch_boolean(parts, manifold3d.OpType.Add)
+        return whole.transform(_inverse(self.frame))
+
+
 class _Bench:
     """The cells in question as solids, while meeting after meeting is carved."""
 
@@ -214,6 +258,8 @@ class _Bench:
         level = (corners[0][2] + np.arange(_SLABS + 1) / _SLABS) * self.voxel_mm
         inner, outer = low * self.voxel_mm, high * self.voxel_mm
         sides = [_slabs(self._parts(v), to, level) for to, v in zip(frames, voxels, strict=True)]
+        first = _Side(meeting.first, frames[0], rings, level, ahead=False)
+        second = _Side(meeting.second, frames[1], rings, level, ahead=True)
         # Looked at before either is cut.
         begins = np.array([_extreme(edges, rings, -1.0) for edges in sides[0]])
         ends = np.array([_extreme(edges, rings, 1.0) for edges in sides[1]])
@@ -224,35 +270,25 @@ class _Bench:
         first_gives = (rings[1:] > inner) & (rings[:-1] < outer)
         second_gives = (rings[:-1] < inner + near) | (rings[1:] > outer - near)
         if first_gives.any():
-            limit = np.where(first_gives, ends, -np.inf)
-            self._take(meeting.first, frames[0], rings, level, limit, False, out)
+            self._take(first, np.where(first_gives, ends, -np.inf), out)
         if second_gives.any():
-            limit = np.where(second_gives, begins, np.inf)
-            self._take(meeting.second, frames[1], rings, level, limit, True, out)
+            self._take(second, np.where(second_gives, begins, np.inf), out)
         # Struts: behind what the other has been cut for.
         square = [_square_edges(corner * self.voxel_mm, self.voxel_mm) for corner in corners]
         last = _extreme(square[1], rings, 1.0)
         nearest = _extreme(square[0], rings, -1.0)
         shut_first = np.where(gives, -np.inf, np.where(np.isfinite(begins), begins, last))
         shut_second = np.where(gives, np.where(np.isfinite(ends), ends, nearest), np.inf)
-        self._shut(meeting.first, frames[0], rings, level, shut_first, False, out)
-        self._shut(meeting.second, frames[1], rings, level, shut_second, True, out)
+        self._shut(first, shut_first, out)
+        self._shut(second, shut_second, out)
 
-    def _take(
-        self,
-        voxel: int,
-        frame: Floats,
-        rings: Floats,
-        level: Floats,
-        limit: Floats,
-        ahead: bool,
-        out: Carved,
-    ) -> None:
-        """Take from a voxel what lies ahead of (or behind) the limits (slabs, rings)."""
-        tool = _solid(rings, level, limit, ahead, self._reach)
+    def _take(self, side: _Side, limit: Floats, out: Carved) -> None:
+        """Take from a cell what lies beyond the limits (slabs, rings)."""
+        voxel = side.voxel
+        tool = side.beyond(limit, self._reach)
         if tool is None:
             return
-        tool = _worked_out(tool.transform(_inverse(frame)) ^ self._box(voxel, 2 * self._reach))
+        tool = _worked_out(tool ^ self._box(voxel, 2 * self._reach))
         cell = self._cell(voxel)
         body = int(self.body[voxel])
         hit = False
@@ -276,20 +312,12 @@ class _Bench:
             self.cells[other] = _worked_out(self.cells[other] - tool)
         self._whole[body] = _worked_out(self._whole[body] - tool)
 
-    def _shut(
-        self,
-        voxel: int,
-        frame: Floats,
-        rings: Floats,
-        level: Floats,
-        limit: Floats,
-        ahead: bool,
-        out: Carved,
-    ) -> None:
-        tool = _solid(rings, level, limit, ahead, 0.0)
+    def _shut(self, side: _Side, limit: Floats, out: Carved) -> None:
+        """Keep struts out of what lies beyond the limits (slabs, rings)."""
+        tool = side.beyond(limit, 0.0)
         if tool is not None:
-            tool = tool.transform(_inverse(frame)) ^ self._box(voxel, 0.0)
-            out.shut.setdefault(int(self.body[voxel]), []).append(tool)
+            body = int(self.body[side.voxel])
+            out.shut.setdefault(body, []).append(tool ^ self._box(side.voxel, 0.0))
 
     def _count(self, out: Carved) -> None:
         skin = None
@@ -402,30 +430,6 @@ def _extreme(edges: Floats, rings: Floats, sign: float) -> Floats:
             point = base[i] + t[:, None] * line[i]
             np.maximum.at(best, j, sign * np.arctan2(point[:, 1], point[:, 0]))
     return sign * best
-
-
-def _solid(
-    rings: Floats, level: Floats, limit: Floats, ahead: bool, wider: float
-) -> manifold3d.Manifold | None:
-    """What lies ahead of (or behind) the limits (slabs, rings), made wider all around."""
-    import manifold3d
-
-    parts = []
-    k = 0
-    while k < len(limit):
-        last = k
-        while last + 1 < len(limit) and np.array_equal(limit[last + 1], limit[k]):
-            last += 1
-        section = _section(rings, limit[k], ahead)
-        if section is not None:
-            if wider > 0.0:
-                section = section.offset(wider, manifold3d.JoinType.Round, 2.0, 24)
-            height = level[last + 1] - level[k] + 2 * wider
-            parts.append(section.extrude(height).translate((0.0, 0.0, level[k] - wider)))
-        k = last + 1
-    if not parts:
-        return None
-    return manifold3d.Manifold.batch_boolean(parts, manifold3d.OpType.Add)
 
 
 def _section(rings: Floats, limit: Floats, ahead: bool) -> manifold3d.CrossSection | None:

@@ -18,7 +18,8 @@ class Effort:
     roots : int
         Root poses tried before growing is given up.
     restarts : int
-        Fresh starts of the folding phase; the search goes on to the next while none folds.
+        Fresh starts of the folding phase while none folds; then another seed, with another
+        voxelization, is worth more.
     removals : int
         Large-neighbourhood moves, per start, until hinges that can turn join all the clusters.
     closing : int
@@ -51,7 +52,7 @@ class Effort:
 
     beam: int = 10
     roots: int = 1000
-    restarts: int = 200
+    restarts: int = 12
     removals: int = 30000
     closing: int = 8
     looking: int = 1
@@ -71,7 +72,7 @@ class Effort:
 
 #: Effort by name, as the command line offers it.
 EFFORTS: dict[str, Effort] = {
-    "quick": Effort(restarts=60, gathering=1, polishing=200),
+    "quick": Effort(restarts=6, gathering=1, polishing=200),
     "normal": Effort(),
-    "thorough": Effort(restarts=700, gathering=30, polishing=20000),
+    "thorough": Effort(restarts=60, gathering=30, polishing=20000),
 }

@@ -12,7 +12,7 @@ from fabfold.tree.problem import Tables
 from fabfold.tree.rng import mix, random_float
 from fabfold.tree.room import clash, close, occupy, saved, seen_twice
 
-__all__ = ["clusters", "doubles_needed", "energy_of", "fill_beam"]
+__all__ = ["clusters", "doubles_needed", "energy_of", "fill_beam", "pieces"]
 
 
 #: Price of a double hinge while growing. A voxel can hold one only, so where they are taken freely
@@ -21,37 +21,45 @@ SCARCE = 0.1
 
 
 @njit(cache=True)
-def clusters(tables: Tables, pose: NDArray[np.int32], label: NDArray[np.int32]) -> int:
-    """Label the rigid clusters of the placed voxels; -1 for voxels that are not placed.
+def pieces(tables: Tables, pose: NDArray[np.int32], last: int, label: NDArray[np.int32]) -> int:
+    """Label what the joint types 0 to `last` join of the placed voxels; -1 for the others.
 
     Returns
     -------
     int
-        Number of clusters.
+        Number of pieces.
     """
     count = len(pose)
     stack = np.empty(count, np.int32)
     label[:] = -1
     found = 0
-    for seed in range(count):
-        if pose[seed] < 0 or label[seed] >= 0:
+    for first in range(count):
+        if pose[first] < 0 or label[first] >= 0:
             continue
-        label[seed] = found
-        stack[0] = seed
+        label[first] = found
+        stack[0] = first
         top = 1
         while top > 0:
             top -= 1
             u = stack[top]
             for f in range(6):
                 v = tables.neighbour[u, f]
-                if v < 0 or pose[v] < 0 or label[v] >= 0 or not tables.allowed[u, f, 0]:
+                if v < 0 or pose[v] < 0 or label[v] >= 0:
                     continue
-                if tables.step[f, 0, pose[u]] == pose[v]:
-                    label[v] = found
-                    stack[top] = v
-                    top += 1
+                for j in range(last + 1):
+                    if tables.allowed[u, f, j] and tables.step[f, j, pose[u]] == pose[v]:
+                        label[v] = found
+                        stack[top] = v
+                        top += 1
+                        break
         found += 1
     return found
+
+
+@njit(cache=True)
+def clusters(tables: Tables, pose: NDArray[np.int32], label: NDArray[np.int32]) -> int:
+    """Label the rigid clusters of the placed voxels, and return their number; see `pieces`."""
+    return pieces(tables, pose, 0, label)
 
 
 @njit(cache=True)
@@ -70,31 +78,7 @@ def doubles_needed(tables: Tables, pose: NDArray[np.int32]) -> int:
     """Fewest double hinges: the pieces, less one, that rigid joints and single hinges leave."""
     if tables.single + 1 >= tables.step.shape[1]:
         return 0
-    count = len(pose)
-    stack = np.empty(count, np.int32)
-    seen = np.zeros(count, np.bool_)
-    found = 0
-    for first in range(count):
-        if pose[first] < 0 or seen[first]:
-            continue
-        seen[first] = True
-        found += 1
-        stack[0] = first
-        top = 1
-        while top > 0:
-            top -= 1
-            u = stack[top]
-            for f in range(6):
-                v = tables.neighbour[u, f]
-                if v < 0 or pose[v] < 0 or seen[v]:
-                    continue
-                for j in range(tables.single + 1):
-                    if tables.allowed[u, f, j] and tables.step[f, j, pose[u]] == pose[v]:
-                        seen[v] = True
-                        stack[top] = v
-                        top += 1
-                        break
-    return max(0, found - 1)
+    return max(0, pieces(tables, pose, tables.single, np.empty(len(pose), np.int32)) - 1)
 
 
 @njit(cache=True)

@@ -302,17 +302,18 @@ def _restricted(
     )
 
 
-def _hinged(template: Template, parts: Parts) -> NDArray[np.bool_]:
-    """Lattice edges of the flat template that hinges may lie on, by twice the middle plus 1.
+def _hinged(template: Template, parts: Parts) -> NDArray[np.int32]:
+    """Lattice edges of the flat template that hinges may lie on, see ``Tables.hinged``.
 
     Those that two parts share are left to the creases. Edges of two parts that only meet in the
-    folded shape stay free: to forbid half of them would cost far more trees than the few in which
-    both carry a hinge, which :func:`fabfold.fold.closing.closed` refuses.
+    folded shape have one number, so that one of them carries a hinge at most.
     """
     folded = folded_template(template)
     inside = folded.inside_edges() if template.joints == "inside" else None
+    number = np.arange(np.prod(2 * np.array(folded.shape) + 1), dtype=np.int32)
+    number = number.reshape(2 * np.array(folded.shape) + 1)
     owner = np.full(2 * np.array(template.shape) + 1, -1, dtype=np.int32)
-    hinged = np.zeros(owner.shape, dtype=bool)
+    hinged = np.full(owner.shape, -1, dtype=np.int32)
     corners = [np.array([a, b]) for a in (-1, 1) for b in (-1, 1)]
     for cell, part in zip(template.cells, parts.part.tolist(), strict=True):
         pose = parts.poses[part]
@@ -323,10 +324,11 @@ def _hinged(template: Template, parts: Parts) -> NDArray[np.bool_]:
                 at = tuple((edge + 1).tolist())
                 free = owner[at] in (-1, part)
                 owner[at] = part
+                turned = 2 * (pose[:3, :3] @ (edge / 2) + pose[:3, 3] + parts.shift)
+                landed = tuple(np.rint(turned + 1).astype(int).tolist())
                 if inside is not None:
-                    landed = 2 * (pose[:3, :3] @ (edge / 2) + pose[:3, 3] + parts.shift)
-                    free = free and bool(inside[tuple(np.rint(landed + 1).astype(int))])
-                hinged[at] = free
+                    free = free and bool(inside[landed])
+                hinged[at] = number[landed] if free else -1
     return hinged
 
 

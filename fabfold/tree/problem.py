@@ -78,9 +78,10 @@ class Tables(NamedTuple):
     stiff : (n, 6) bool array
         Pairs that no cut may part: both voxels must keep their relative pose. No rows where
         there is no such pair.
-    hinged : (a, b, c) bool array
-        Lattice edges of the template on which hinges may lie, by twice the middle plus 1; of no
-        size where all may be used.
+    hinged : (a, b, c) int32 array
+        Lattice edges of the template by twice the middle plus 1: a number for the edge on which a
+        hinge there comes to rest in the end, -1 where none may lie. Of no size where all may be
+        used and rest where they are.
     exposed : (m,) uint8 array
         Bit ``f`` set where the template ends at face ``f`` of a cell.
     around : (m, 6) int32 array
@@ -110,7 +111,7 @@ class Tables(NamedTuple):
     cost: NDArray[np.float32]
     centre: NDArray[np.float32]
     stiff: NDArray[np.bool_]
-    hinged: NDArray[np.bool_]
+    hinged: NDArray[np.int32]
     exposed: NDArray[np.uint8]
     around: NDArray[np.int32]
     source: NDArray[np.int32]
@@ -384,9 +385,11 @@ def tree_problem(
             face = int(np.flatnonzero((cells[j] - cells[i] == FACES).all(axis=1))[0])
             whole[i, face] = whole[j, face ^ 1] = True
             allowed[i, face, 1:] = allowed[j, face ^ 1, 1:] = False
-    hinged = np.zeros((0, 0, 0), dtype=bool)
+    hinged = np.zeros((0, 0, 0), dtype=np.int32)
     if template.joints == "inside":
-        hinged = template.inside_edges()
+        inside = template.inside_edges()
+        number = np.arange(inside.size, dtype=np.int32).reshape(inside.shape)
+        hinged = np.where(inside, number, np.int32(-1))
     tables = Tables(
         neighbour=neighbour,
         allowed=allowed,

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.tree.grow import clusters
+from fabfold.tree.grow import clusters, pieces
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_float
 from fabfold.tree.room import find_guests
@@ -45,45 +45,11 @@ def apart(tables: Tables, pose: NDArray[np.int32]) -> int:
 
     Zero for a full set of poses that some tree joins.
     """
-    count = len(pose)
-    seen = np.zeros(count, np.bool_)
-    stack = np.empty(count, np.int32)
-    total = -1
-    for first in range(count):
-        if seen[first]:
-            continue
-        seen[first] = True
-        total += 1
-        if pose[first] < 0:
-            continue
-        stack[0] = first
-        top = 1
-        while top > 0:
-            top -= 1
-            u = stack[top]
-            for f in range(6):
-                v = tables.neighbour[u, f]
-                if v < 0 or seen[v] or pose[v] < 0:
-                    continue
-                if relation(tables, u, f, v, pose) >= 0:
-                    seen[v] = True
-                    stack[top] = v
-                    top += 1
-    return total
-
-
-@njit(cache=True)
-def _hinge_allowed(tables: Tables, q: int, d: NDArray[np.int32], n: NDArray[np.int32]) -> bool:
-    """Whether a hinge on side n of face d of the voxel at pose q may lie there in the template."""
-    if tables.hinged.shape[0] == 0:
-        return True
-    rotation = tables.rotations[q % 24]
-    at = np.empty(3, np.int32)
-    for x in range(3):
-        at[x] = 2 * tables.cells[q // 24, x] + 1
-        for y in range(3):
-            at[x] += rotation[x, y] * (d[y] + n[y])
-    return tables.hinged[at[0], at[1], at[2]]
+    left = pieces(tables, pose, tables.step.shape[1] - 1, np.empty(len(pose), np.int32))
+    for v in range(len(pose)):
+        if pose[v] < 0:
+            left += 1
+    return left - 1
 
 
 @njit(cache=True)
@@ -131,6 +97,28 @@ def _hinge_fits(
 
 
 @njit(cache=True)
+def _resting_edge(
+    tables: Tables,
+    q: int,
+    d: NDArray[np.int32],
+    n: NDArray[np.int32],
+    out: NDArray[np.int32],
+) -> bool:
+    """The edge on side n of face d of the voxel at pose q; whether a hinge may lie there.
+
+    `out` gets its middle in B, doubled; where the template folds once more, a number for the edge
+    on which it ends.
+    """
+    _edge_in_template(tables, q, d, n, out)
+    if tables.hinged.shape[0] == 0:
+        return True
+    out[0] = tables.hinged[out[0] + 1, out[1] + 1, out[2] + 1]
+    out[1] = 0
+    out[2] = 0
+    return out[0] >= 0
+
+
+@njit(cache=True)
 def candidates(  # noqa: PLR0912, PLR0915 - one row of the table after the other
     tables: Tables,
     pose: NDArray[np.int32],
@@ -153,7 +141,8 @@ def candidates(  # noqa: PLR0912, PLR0915 - one row of the table after the other
         Filled with the cluster of each voxel.
     found : (:func:`hinge_rows`, 24) int32 array
         Filled with one row a hinge: 0, 1 voxels u and v; 2, 3 their clusters; 4 face of u; 5 joint
-        type; 6 to 8 twice the middle of its lattice edge in A, 9 to 11 in B; 12 its row of
+        type; 6 to 8 twice the middle of its lattice edge in A, 9 to 11 in B (or the number in
+        ``Tables.hinged``, and zeros); 12 its row of
         ``Tables.way``; 13 whether it is double, and if so, 14 to 19 the edge of the second axis in
         A and B, and 20 to 22 twice the middle of the link plate in B.
 
@@ -174,6 +163,8 @@ def candidates(  # noqa: PLR0912, PLR0915 - one row of the table after the other
         member[at[label[v]]] = v
         at[label[v]] += 1
     plate = np.empty(3, np.int32)
+    first = np.empty(3, np.int32)
+    second = np.empty(3, np.int32)
     guest = np.zeros(count, np.bool_)
     sharing = tables.shares > 0
     if sharing:
@@ -196,7 +187,7 @@ def candidates(  # noqa: PLR0912, PLR0915 - one row of the table after the other
                 n = hinges.faces[hinges.sides[f, tables.way[w, 0]]]
                 turns = tables.way[w, 1]
                 double = tables.way[w, 2] >= 0
-                if not _hinge_allowed(tables, pose[u], d, n):
+                if not _resting_edge(tables, pose[u], d, n, first):
                     continue
                 side = hinges.sides[f, tables.way[w, 0]]
                 if sharing and not _hinge_fits(tables, guest, u, v, f, side, double):
@@ -207,7 +198,7 @@ def candidates(  # noqa: PLR0912, PLR0915 - one row of the table after the other
                         continue
                 else:
                     m = hinges.faces[hinges.sides[f, tables.way[w, 2]]]
-                    if not _hinge_allowed(tables, pose[v], back, m):
+                    if not _resting_edge(tables, pose[v], back, m, second):
                         continue
                     if double_blocked(
                         tables.source,
@@ -233,13 +224,13 @@ def candidates(  # noqa: PLR0912, PLR0915 - one row of the table after the other
                 row[13] = double
                 for x in range(3):
                     row[6 + x] = 2 * tables.source[u, x] + d[x] + n[x]
-                _edge_in_template(tables, pose[u], d, n, row[9:12])
+                    row[9 + x] = first[x]
                 if double:
                     for x in range(3):
                         row[14 + x] = 2 * tables.source[u, x] + d[x] + m[x]
+                        row[17 + x] = second[x]
                         # The plate reaches from its first axis along -n, d, n, -d by turns.
                         plate[x] = n[x] + (n[x] if turns == 2 else (2 - turns) * d[x])
-                    _edge_in_template(tables, pose[v], back, m, row[17:20])
                     _edge_in_template(tables, pose[u], d, plate, row[20:23])
                 rows += 1
     return total, rows
@@ -260,7 +251,7 @@ def _alike(row: NDArray[np.int32], a: int, other: NDArray[np.int32], b: int) -> 
 
 @njit(cache=True)
 def _clash(row: NDArray[np.int32], other: NDArray[np.int32]) -> bool:
-    """Whether two hinges want one lattice edge in A or in B, one plate's face or one voxel."""
+    """Whether two hinges want one lattice edge in A or in the end, one plate's face, one voxel."""
     if _alike(row, 6, other, 6) or _alike(row, 9, other, 9):
         return True
     if row[13] != 0 and (_alike(row, 14, other, 6) or _alike(row, 17, other, 9)):
@@ -293,8 +284,8 @@ def spanning_tree(
 ) -> int:
     """Random spanning tree of the clusters.
 
-    No two of its hinges share a lattice edge segment in A or in B, and no voxel has two double
-    hinges (paper section 4.1, joint collision). Single hinges are preferred.
+    No two of its hinges share a lattice edge segment in A or in the end, and no voxel has two
+    double hinges (paper section 4.1, joint collision). Single hinges are preferred.
 
     Parameters
     ----------

@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import NoFoldError, NoTreeError
-from fabfold.lattice import parity
 from fabfold.tree.build import HingeChoice, SpanningTree, fold_tree, hinge_choice
 from fabfold.tree.effort import Effort
 from fabfold.tree.foldability import Foldability, Outlook
-from fabfold.tree.grow import energy_of, fill_beam
+from fabfold.tree.grow import energy_of
 from fabfold.tree.model import FoldTree
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.rebuild import loose_pieces
 from fabfold.tree.rng import generator
-from fabfold.tree.ruin import propose, repair
+from fabfold.tree.ruin import propose
+from fabfold.tree.starts import grow
 from fabfold.tree.wedge import hinge_tables
 
-__all__ = ["Candidate", "Statistics", "grow", "solve"]
+__all__ = ["Candidate", "Statistics", "solve"]
 
 
 @dataclass(frozen=True)
@@ -98,73 +98,6 @@ def _scale(voxels: int) -> _Scale:
     if voxels <= 72:
         return _Scale(stuck=0.15, cost=1.0, joint=0.1, hot=0.15, cold=0.02)
     return _Scale(stuck=1.0, cost=0.2, joint=0.1, hot=0.1, cold=0.01)
-
-
-def grow(
-    problem: TreeProblem,
-    seed: int,
-    *,
-    beam: int = 10,
-    roots: int = 400,
-    repairs: int = 2000,
-    stop: Callable[[], bool] | None = None,
-) -> Iterator[NDArray[np.int32]]:
-    """Full sets of poses grown from random root poses.
-
-    The beam seldom completes a template that has no cell to spare; what it leaves over is then
-    placed by moving other voxels out of the way.
-
-    Parameters
-    ----------
-    problem : TreeProblem
-    seed : int
-    beam : int
-        States kept.
-    roots : int
-        Root poses tried.
-    repairs : int
-        Removals tried to complete a set of poses.
-    stop : callable, optional
-        Polled before each root pose; once it returns True no more are tried.
-
-    Yields
-    ------
-    (n,) int32 array
-        ``24 * template cell + rotation`` of each voxel.
-
-    Raises
-    ------
-    NoTreeError
-        If the checkerboard colours rule every tree out.
-    """
-    colourings = problem.colourings()
-    rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
-    state = generator(int(rng.integers(2**62)))
-    colour = parity(problem.source)
-    cells = [np.flatnonzero(parity(problem.template.cells) == c) for c in (0, 1)]
-    count = len(problem)
-    out = np.empty((beam, count), np.int32)
-    for number in range(roots):
-        if stop is not None and stop():
-            return
-        # Double hinges grown freely leave pieces that no tree joins; they come in later. Every
-        # fourth time they may help to fill the template.
-        tables = problem.tables if number % 4 == 3 else problem.single_tables
-        root = int(rng.integers(count))
-        wanted = cells[(colour[root] + colourings[int(rng.integers(len(colourings)))]) % 2]
-        start = np.full(count, -1, np.int32)
-        start[root] = 24 * wanted[rng.integers(len(wanted))] + rng.integers(24)
-        if problem.roots is not None:
-            start[root] = -1
-            root, first = problem.roots[rng.integers(len(problem.roots))].tolist()
-            start[root] = first
-        todo = np.flatnonzero(start < 0).astype(np.int32)
-        if len(todo):
-            fill_beam(tables, start, todo, beam, 0.3, 0.5, True, state, out)
-            start = out[0].copy()
-        left, _ = repair(tables, start, repairs, 20, 12, state)
-        if left == 0:
-            yield start
 
 
 class _Search:

@@ -147,18 +147,18 @@ def blocked(
     n_axis = 0 if n[0] != 0 else (1 if n[1] != 0 else 2)
     along = 3 - d_axis - n_axis
     for i in range(len(child_cells)):
-        c = source[child_cells[i]]
+        c = child_cells[i]
         # In the plane (d, n) with the axis at the origin, the turn goes from d to n.
-        a = (c[d_axis] - at[d_axis]) * d[d_axis] - 1 + reach
-        b = (c[n_axis] - at[n_axis]) * n[n_axis] - 1 + reach
+        a = (source[c, d_axis] - at[d_axis]) * d[d_axis] - 1 + reach
+        b = (source[c, n_axis] - at[n_axis]) * n[n_axis] - 1 + reach
         if a < 0 or b < 0 or a >= 2 * reach or b >= 2 * reach:
             continue
         for k in range(len(parent_cells)):
-            p = source[parent_cells[k]]
-            if p[along] != c[along]:
+            p = parent_cells[k]
+            if source[p, along] != source[c, along]:
                 continue
-            x = (p[d_axis] - at[d_axis]) * d[d_axis] - 1 + reach
-            y = (p[n_axis] - at[n_axis]) * n[n_axis] - 1 + reach
+            x = (source[p, d_axis] - at[d_axis]) * d[d_axis] - 1 + reach
+            y = (source[p, n_axis] - at[n_axis]) * n[n_axis] - 1 + reach
             if x < 0 or y < 0 or x >= 2 * reach or y >= 2 * reach:
                 continue
             if table[a, b, x, y]:
@@ -168,78 +168,38 @@ def blocked(
 
 @njit(cache=True)
 def _turned(
-    point: NDArray[np.int32],
-    pivot: NDArray[np.int32],
+    cell: NDArray[np.int32],
+    at: NDArray[np.int32],
     d: NDArray[np.int32],
     n: NDArray[np.int32],
     quarters: int,
     out: NDArray[np.int32],
 ) -> None:
-    """Turn a point from d to n by quarters about an edge; both are doubled."""
+    """Turn a cell from d to n by quarters about the edge of cell `at`."""
     cosine = (1, 0, -1, 0)[quarters & 3]
     sine = (0, 1, 0, -1)[quarters & 3]
-    along = 0
-    across = 0
+    # Twice the distances from the axis.
+    along = -1
+    across = -1
     for x in range(3):
-        along += (point[x] - pivot[x]) * d[x]
-        across += (point[x] - pivot[x]) * n[x]
+        along += 2 * (cell[x] - at[x]) * d[x]
+        across += 2 * (cell[x] - at[x]) * n[x]
     u = cosine * along - sine * across
     v = sine * along + cosine * across
     for x in range(3):
-        out[x] = point[x] + (u - along) * d[x] + (v - across) * n[x]
+        out[x] = cell[x] + ((u - along) >> 1) * d[x] + ((v - across) >> 1) * n[x]
 
 
 @njit(cache=True)
-def _runs_into(
-    moving: NDArray[np.int32],
-    still: NDArray[np.int32],
-    pivot: NDArray[np.int32],
-    d: NDArray[np.int32],
-    n: NDArray[np.int32],
-    table: NDArray[np.bool_],
-) -> bool:
-    """Whether cells run into others in a quarter turn from d to n; all points are doubled."""
-    reach = table.shape[0] // 2
-    for i in range(len(moving)):
-        a = 0
-        b = 0
-        for x in range(3):
-            a += (moving[i, x] - pivot[x]) * d[x]
-            b += (moving[i, x] - pivot[x]) * n[x]
-        a = ((a - 1) >> 1) + reach
-        b = ((b - 1) >> 1) + reach
-        if a < 0 or b < 0 or a >= 2 * reach or b >= 2 * reach:
-            continue
-        for k in range(len(still)):
-            e = 0
-            f = 0
-            level = True
-            for x in range(3):
-                e += (still[k, x] - pivot[x]) * d[x]
-                f += (still[k, x] - pivot[x]) * n[x]
-                if d[x] == 0 and n[x] == 0 and still[k, x] != moving[i, x]:
-                    level = False
-            if not level:
-                continue
-            e = ((e - 1) >> 1) + reach
-            f = ((f - 1) >> 1) + reach
-            if e < 0 or f < 0 or e >= 2 * reach or f >= 2 * reach:
-                continue
-            if table[a, b, e, f]:
-                return True
-    return False
-
-
-@njit(cache=True)
-def _holds(cells: NDArray[np.int32], point: NDArray[np.int32]) -> bool:
-    for i in range(len(cells)):
-        if cells[i, 0] == point[0] and cells[i, 1] == point[1] and cells[i, 2] == point[2]:
+def _holds(source: NDArray[np.int32], cells: NDArray[np.int32], place: NDArray[np.int32]) -> bool:
+    for v in cells:
+        if source[v, 0] == place[0] and source[v, 1] == place[1] and source[v, 2] == place[2]:
             return True
     return False
 
 
 @njit(cache=True)
-def double_blocked(  # noqa: PLR0912 - tables for 16 states, then the search of them
+def double_blocked(
     source: NDArray[np.int32],
     parent_cells: NDArray[np.int32],
     child_cells: NDArray[np.int32],
@@ -267,47 +227,28 @@ def double_blocked(  # noqa: PLR0912 - tables for 16 states, then the search of 
     table : bool array
         :func:`quarter_turn_table`.
     """
-    pivot1 = 2 * at + d + n1
-    pivot2 = 2 * at + d + n2
-    ahead = 2 * (at + d)
+    ahead = at + d
     # Cells that the plate sweeps, quarter by quarter: against the parent, against the child.
-    plate1 = np.empty((3, 3), np.int32)
-    plate2 = np.empty((3, 3), np.int32)
-    for x in range(3):
-        plate1[0, x] = ahead[x]
-        plate1[1, x] = ahead[x] + 2 * n1[x]
-        plate1[2, x] = 2 * (at[x] + n1[x])
-        plate2[0, x] = 2 * at[x]
-        plate2[1, x] = 2 * (at[x] + n2[x])
-        plate2[2, x] = ahead[x] + 2 * n2[x]
-    parents = np.empty((len(parent_cells), 3), np.int32)
-    children = np.empty((len(child_cells), 3), np.int32)
-    for i in range(len(parent_cells)):
-        for x in range(3):
-            parents[i, x] = 2 * source[parent_cells[i], x]
-    for i in range(len(child_cells)):
-        for x in range(3):
-            children[i, x] = 2 * source[child_cells[i], x]
-    free1 = np.empty(3, np.bool_)
-    free2 = np.empty(3, np.bool_)
-    for q in range(3):
-        free1[q] = not _holds(parents, plate1[q])
-        free2[q] = not _holds(children, plate2[q])
+    swept1 = (ahead, ahead + n1, at + n1)
+    swept2 = (at, at + n2, ahead + n2)
     for q in range(q1):
-        if not free1[q]:
+        if _holds(source, parent_cells, swept1[q]):
             return True
     for q in range(q2):
-        if not free2[q]:
+        if _holds(source, child_cells, swept2[q]):
             return True
     # The child turned by its own axis, the parent turned back by its own: seen from the link.
-    child = np.empty((q2 + 1, len(children), 3), np.int32)
-    parent = np.empty((q1 + 1, len(parents), 3), np.int32)
+    parents, children = len(parent_cells), len(child_cells)
+    row = np.arange((q1 + 1) * parents + (q2 + 1) * children).astype(np.int32)
+    parent = row[: (q1 + 1) * parents].reshape(q1 + 1, parents)
+    child = row[(q1 + 1) * parents :].reshape(q2 + 1, children)
+    cells = np.empty((len(row), 3), np.int32)
+    for i in range(q1 + 1):
+        for v in range(parents):
+            _turned(source[parent_cells[v]], at, d, n1, -i, cells[parent[i, v]])
     for j in range(q2 + 1):
-        for i in range(len(children)):
-            _turned(children[i], pivot2, d, n2, j, child[j, i])
-    for j in range(q1 + 1):
-        for i in range(len(parents)):
-            _turned(parents[i], pivot1, d, n1, -j, parent[j, i])
+        for v in range(children):
+            _turned(source[child_cells[v]], at, d, n2, j, cells[child[j, v]])
     seen = np.zeros((q1 + 1, q2 + 1), np.bool_)
     seen[0, 0] = True
     stack = np.empty((16, 2), np.int32)
@@ -327,9 +268,9 @@ def double_blocked(  # noqa: PLR0912 - tables for 16 states, then the search of 
             x = min(i, a)
             y = min(j, b)
             if a != i:
-                hit = _runs_into(child[j], parent[x], pivot1, d, n1, table)
+                hit = blocked(cells, parent[x], child[j], at, d, n1, table)
             else:
-                hit = _runs_into(child[y], parent[i], pivot2, d, n2, table)
+                hit = blocked(cells, parent[i], child[y], at, d, n2, table)
             if not hit:
                 seen[a, b] = True
                 stack[top, 0] = a

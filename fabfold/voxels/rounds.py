@@ -7,6 +7,8 @@ tried again at pitches in between.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +39,8 @@ _EXCESS_COST = 2.0
 #: Rotations of which small turns are tried, and how small these are.
 _CENTRES = 10
 _SPREAD_DEG = 4.0
+#: Rotations that a search for fewer cells takes over from one for more.
+_AGAIN = 40
 #: Translations along each axis.
 _STEPS = 4
 #: Pitches added at most because they divide a side of the model evenly.
@@ -120,6 +124,13 @@ class Rounds:
         self.family = list(range(len(rotations)))
         self.energy = energy
         self.limit = limit
+
+    def with_share(self, share: float) -> Rounds:
+        """The same search for a share of the template's cells of each colour."""
+        other = copy(self)
+        even, odd = (int(share * cells) for cells in self.capacity.colours)
+        other.capacity = Capacity(even + odd, (even, odd))
+        return other
 
     def _coarse(
         self, rotation: int, side: float
@@ -208,6 +219,14 @@ class Rounds:
                 progress.update(0.4 * (index + 1) / count, f"{index + 1} rotations, best {top:.1f}")
         ranked.sort(key=lambda item: -item.score)
         return ranked
+
+    def again(self, ranked: Sequence[Ranked], pitches: NDArray[np.float64]) -> list[Ranked]:
+        """Rank the rotations that did best in another search: the best grid of each, best first."""
+        best = list(dict.fromkeys(item.rotation for item in ranked))[:_AGAIN]
+        found = [
+            max(self._ranked(rotation, pitches), key=lambda item: item.score) for rotation in best
+        ]
+        return sorted(found, key=lambda item: -item.score)
 
     def _ranked(self, rotation: int, pitches: NDArray[np.float64]) -> list[Ranked]:
         """The best grids of one rotation, their planes moved, on one coarse scan."""

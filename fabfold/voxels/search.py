@@ -18,7 +18,7 @@ from fabfold.voxels.placement import grid_rotations
 from fabfold.voxels.regions import Region, spread
 from fabfold.voxels.rounds import PITCHES, Ranked, Rounds, Tried
 
-__all__ = ["MAX_LOSS", "voxelize"]
+__all__ = ["MAX_LOSS", "shares_of", "voxelize"]
 
 #: A voxelization that loses more than this share of the model's volume is no solution.
 MAX_LOSS = 0.10
@@ -30,8 +30,16 @@ _REFINED = 6
 _LARGER = ((22, 23), (24, 25), (26, 28), (30, 33), (36, 40))
 #: Two voxelizations whose sorted fills differ by less than this on average are the same.
 _SAME_FILL = 0.012
-#: A voxelization with at most this share of the template's cells is a roomy one.
-_ROOMY = 0.94
+#: Voxelizations of different size that are looked for, and how much of a template the smallest
+#: leaves free: this, times the cube root of the number of its cells. Folding into a box that is
+#: full to the last cell is hard, and the harder the larger it is; with gaps, which may lie inside,
+#: it is a matter of seconds.
+_SIZES = 4
+_FREE = 0.05
+#: Templates of fewer cells have no room to leave.
+_LEAST = 16
+#: Placements of a roomy voxelization whose planes are moved, against those of a full one.
+_FEWER = 4
 
 
 def voxelize(
@@ -87,7 +95,8 @@ def voxelize(
     list of Voxels
         Different ones, best first: most total fill, less 0.5 a sliver, less lost material. The
         counts of both checkerboard colours fit the template, and the voxels hang together through
-        printed contacts.
+        printed contacts. Of four, three leave a part of the template free, each more than the one
+        before, see :func:`shares_of`; not where `pitch` or `origin` is given.
 
     Raises
     ------
@@ -116,19 +125,55 @@ def voxelize(
         raise NoVoxelsError("the model encloses no volume; repair it first")
     _refuse_thin(rounds, pitch)
 
+    free = pitch is None and centre is None
     pitches = np.array([pitch]) if pitch is not None else _pitches(rounds, max_loss, centre)
     if centre is None:
-        ranked = rounds.first(pitches, nearby, seed, progress)[:shortlist]
+        ranked = rounds.first(pitches, nearby, seed, progress)
     else:
         x, y, z = centre.tolist()
         ranked = [Ranked(0.0, 0, float(value), (x, y, z)) for value in pitches]
-    units = PITCHES if pitch is None and centre is None else (SUBDIVISION,)
+    shares = shares_of(len(template))[:results] if free else (1.0,)
+    chosen: list[Tried] = []
+    done: list[tuple[float, Voxels]] = []
+    for place, share in enumerate(shares):
+        count = len(range(place, results, len(shares)))
+        if place == 0:
+            some = ranked if centre is not None else ranked[:shortlist]
+            found = _tried(rounds, some, free, centre is not None, regions)
+            done = _finish(rounds, found, chosen, count, max_loss, regions)
+            if not done:
+                raise NoVoxelsError(_nearest(rounds, found, max_loss))
+        else:
+            roomy = rounds.with_share(share)
+            again = roomy.again(ranked, pitches * share ** (-1 / 3))
+            found = _tried(roomy, again[: max(1, shortlist // _FEWER)], free, False, regions)
+            done += _finish(roomy, found, chosen, count, max_loss, regions)
+        progress.update(0.4 + 0.6 * (place + 1) / len(shares), f"{len(done)} voxelizations")
+    return [voxels for _, voxels in sorted(done, key=lambda pair: pair[0])]
+
+
+def shares_of(cells: int) -> tuple[float, ...]:
+    """Shares of a template's cells, largest first, that voxelizations shall fill."""
+    if cells < _LEAST:
+        return (1.0,)
+    least = max(0.5, 1.0 - _FREE * cells ** (1 / 3))
+    return tuple(float(share) for share in np.linspace(1.0, least, _SIZES))
+
+
+def _tried(
+    rounds: Rounds,
+    ranked: Sequence[Ranked],
+    free: bool,
+    hold_origin: bool,
+    regions: Sequence[Region],
+) -> list[Tried]:
+    """Grids near those ranked best, with their planes moved, best first."""
+    units = PITCHES if free else (SUBDIVISION,)
     found: list[Tried] = []
-    for index, item in enumerate(ranked):
-        found.extend(rounds.second(item, units, centre is not None))
-        progress.update(0.4 + 0.3 * (index + 1) / len(ranked), f"{index + 1} grids, planes moved")
+    for item in ranked:
+        found.extend(rounds.second(item, units, hold_origin))
     found.sort(key=lambda tried: tried.order)
-    if pitch is None and centre is None:
+    if free:
         for step in _LARGER:
             if found and found[0].verdict.excess == 0:
                 break
@@ -138,11 +183,10 @@ def voxelize(
         for tried in _different(found)[:_REFINED]:
             found.extend(rounds.third(tried))
         found.sort(key=lambda tried: tried.order)
-        progress.update(0.8, "pitch refined")
     if regions:
         price = {id(tried): spread(regions, tried.placement) for tried in found}
         found.sort(key=lambda tried: (tried.order[0], tried.order[1] + price[id(tried)]))
-    return _finish(rounds, found, results, max_loss, progress, regions)
+    return found
 
 
 def _check_numbers(
@@ -234,74 +278,75 @@ def _different(found: list[Tried]) -> list[Tried]:
     return best
 
 
-def _shortlist(rounds: Rounds, found: list[Tried], count: int) -> list[Tried]:
-    """Up to `count` different ones that fit, best first but for every fourth.
-
-    Every fourth leaves a part of the template free, as long as there is such a one: a tree that is
-    hard to fold into a full template may be easy to fold into one with gaps.
-    """
-    roomy = int(_ROOMY * rounds.capacity.cells)
+def _shortlist(
+    rounds: Rounds, found: Sequence[Tried], before: Sequence[Tried], count: int
+) -> list[Tried]:
+    """Up to `count` that fit, best first, different from each other and from those `before`."""
     chosen: list[Tried] = []
     used: dict[int, int] = {}
-
-    def is_new(tried: Tried) -> bool:
+    for tried in found:
         fills = tried.verdict.fills
-        return used.get(rounds.family[tried.rotation], 0) < 2 and all(
-            len(fills) != len(other.verdict.fills)
-            or np.abs(fills - other.verdict.fills).mean() >= _SAME_FILL
-            for other in chosen
-        )
-
-    fitting = [tried for tried in found if tried.verdict.excess == 0]
-    for place in range(count):
-        wanted = [tried for tried in fitting if is_new(tried)]
-        gaps = [tried for tried in wanted if tried.verdict.kept <= roomy]
-        pick = gaps if place % 4 == 3 and gaps else wanted
-        if not pick:
-            break
-        chosen.append(pick[0])
-        family = rounds.family[pick[0].rotation]
+        family = rounds.family[tried.rotation]
+        if tried.verdict.excess > 0 or used.get(family, 0) == 2:
+            continue
+        if any(
+            len(fills) == len(other.verdict.fills)
+            and np.abs(fills - other.verdict.fills).mean() < _SAME_FILL
+            for other in [*before, *chosen]
+        ):
+            continue
+        chosen.append(tried)
         used[family] = used.get(family, 0) + 1
+        if len(chosen) == count:
+            break
     return chosen
 
 
 def _finish(
     rounds: Rounds,
-    found: list[Tried],
-    results: int,
+    found: Sequence[Tried],
+    chosen: list[Tried],
+    count: int,
     max_loss: float,
-    progress: Progress,
     regions: Sequence[Region],
-) -> list[Voxels]:
-    """Cut the best placements and check them."""
-    done: list[Voxels] = []
-    price: list[float] = []
-    nearest = ""
+) -> list[tuple[float, Voxels]]:
+    """Cut the best placements and check them: price, the lower the better, and voxels.
+
+    What is taken is added to `chosen`; what is like an earlier one is passed over.
+    """
+    done: list[tuple[float, Voxels]] = []
     # Sampling the warped model can still cost a cell its place, so some more than are wanted.
-    for tried in _shortlist(rounds, found, 2 * results) or found[:results]:
-        if len(done) >= results:
+    for tried in _shortlist(rounds, found, chosen, 2 * count):
+        voxels, _, _ = cut_voxels(
+            rounds.vertices, rounds.faces, tried.placement, rounds.energy, rounds.capacity
+        )
+        if voxels is None or voxels.lost_volume > max_loss:
+            continue
+        price = spread(regions, tried.placement) - voxels.energy["score"]
+        done.append((price, voxels))
+        chosen.append(tried)
+        if len(done) == count:
             break
+    return done
+
+
+def _nearest(rounds: Rounds, found: Sequence[Tried], max_loss: float) -> str:
+    """Why none of the placements will do."""
+    nearest = "no cell with enough material"
+    for tried in found[:1]:
         voxels, kept, excess = cut_voxels(
             rounds.vertices, rounds.faces, tried.placement, rounds.energy, rounds.capacity
         )
         if voxels is None:
-            nearest = nearest or f"{kept} cells, {excess} of them too many"
-        elif voxels.lost_volume > max_loss:
-            nearest = nearest or (
+            nearest = f"{kept} cells, {excess} of them too many" if kept else nearest
+        else:
+            nearest = (
                 f"{kept} cells, with {100 * voxels.lost_volume:.0f} % of the volume lost "
                 f"(allowed: {100 * max_loss:.0f} %)"
             )
-        else:
-            done.append(voxels)
-            price.append(spread(regions, tried.placement) - voxels.energy["score"])
-            progress.update(0.8 + 0.2 * len(done) / results, f"{len(voxels)} voxels")
-    if not done:
-        even, odd = rounds.capacity.colours
-        raise NoVoxelsError(
-            f"no placement of the grid fits template {rounds.template.name} ({even} + {odd} cells "
-            f"by checkerboard colour); the best has {nearest or 'no cell with enough material'}. "
-            "Try a larger pitch or template, another seed, more placements, or a thicker model"
-        )
-    done = [done[place] for place in np.argsort(price, kind="stable").tolist()]
-    progress.update(1.0, f"{len(done)} voxelizations")
-    return done
+    even, odd = rounds.capacity.colours
+    return (
+        f"no placement of the grid fits template {rounds.template.name} ({even} + {odd} cells "
+        f"by checkerboard colour); the best has {nearest}. "
+        "Try a larger pitch or template, another seed, more placements, or a thicker model"
+    )

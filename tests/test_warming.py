@@ -1,0 +1,15 @@
+import pytest
+
+from fabfold.seeds import run_seed
+from fabfold.tree.catalogue import JOINT_SETS, JointSet
+from fabfold.tree.check import check_tree
+from fabfold.warming import strip_job
+
+
+@pytest.mark.parametrize("joints", JOINT_SETS)
+def test_the_strip_folds_whatever_the_seed(joints: JointSet) -> None:
+    for seed in range(3):
+        result = run_seed(strip_job(joints), seed, lambda _: None, lambda: False)
+        assert not result.failed, result.why
+        assert result.candidates
+        assert check_tree(result.candidates[0].tree) == []
