@@ -66,14 +66,14 @@ def proven(voxels: Voxels, candidate: Candidate) -> str:
 
     tree, motion = candidate.tree, motion_of(candidate.tree, candidate.path)
     try:
-        joinery = build_bodies(voxels, tree, motion, voxel_mm=20.0, clearance_mm=0.5)
+        joinery = build_bodies(voxels, tree, motion, voxel_mm=20.0, clearance_mm=0.3)
         certificate = certify(
             tree,
             motion,
             [(body.vertices, body.faces) for body in joinery.bodies],
             voxel_mm=joinery.voxel_mm,
             origin_mm=joinery.origin_mm,
-            min_gap_mm=0.4,
+            min_gap_mm=0.25,
         )
     except FabfoldError as error:
         return str(error)
