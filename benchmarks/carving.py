@@ -70,7 +70,7 @@ def near_misses(voxels: Any, template: str, count: int) -> list[Any]:
                 problem,
                 seed,
                 judge,
-                Effort(restarts=3, polishing=0),
+                Effort(restarts=3, gathering=1, trying=0, polishing=0),
                 stop=lambda: len(judge.missed) >= count,
             )
         if len(judge.missed) >= count:

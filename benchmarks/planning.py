@@ -28,10 +28,14 @@ VARIANTS = (
 
 
 def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
-    """Hinge systems that phase B asks the planner about, with the steps it is given."""
-    from fabfold.errors import NoFoldError
+    """Hinge systems that phase B asks the planner about, with the steps it is given.
+
+    Of the voxelizations that seeds take in turn, the first one of which a tree folds is polished.
+    """
+    from fabfold.errors import NoFoldError, NoTreeError
     from fabfold.fold.foldability import LatticeFoldability
     from fabfold.lattice import load_template
+    from fabfold.rounds import search_order
     from fabfold.solid.load import load_solid
     from fabfold.tree.effort import Effort
     from fabfold.tree.problem import from_features
@@ -40,7 +44,6 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
     from fabfold.voxels.search import voxelize
 
     target = load_template(template)
-    voxels = voxelize(load_solid(model), target, seed=1)[0]
     found: list[Any] = []
     folds: list[Any] = []
 
@@ -52,16 +55,19 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
                 found.append((system, guide))
             return super().outlook(system, expansions, guide)
 
-    with suppress(NoFoldError):
-        solve(
-            from_features(voxels, features(voxels), target),
-            seed,
-            Noting(),
-            Effort(gathering=1, trying=4000),
-            Statistics(),
-            folds.append,
-            lambda: len(found) >= wanted,
-        )
+    for voxels in search_order(voxelize(load_solid(model), target, seed=1)):
+        with suppress(NoFoldError, NoTreeError):
+            solve(
+                from_features(voxels, features(voxels), target),
+                seed,
+                Noting(),
+                Effort(gathering=1, trying=4000),
+                Statistics(),
+                folds.append,
+                lambda: len(found) >= wanted,
+            )
+        if folds:
+            break
     return found[:wanted]
 
 
@@ -103,6 +109,7 @@ def main() -> None:
     parser.add_argument("--template", default="box-4x4x4")
     parser.add_argument("--systems", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=HERE / "planning.md")
     given = parser.parse_args()
     lines = [
         "# Planning along a known path",
@@ -129,8 +136,9 @@ def main() -> None:
             )
     text = "\n".join(lines) + "\n"
     print(text)
-    (HERE / "planning.md").write_text(text, encoding="utf-8")
-    (HERE / "planning.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    given.out.write_text(text, encoding="utf-8")
+    content = json.dumps(results, indent=1) + "\n"
+    given.out.with_suffix(".json").write_text(content, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -134,3 +134,22 @@ def test_more_time_goes_on_and_the_same_time_does_not_repeat(whole, monkeypatch,
     assert min(ran) == max(done) + 1
     energies = [c["tree"]["energy"]["total"] for seed in before for c in seed["candidates"]]
     np.testing.assert_allclose(best.energy["total"], min(energies))
+
+
+def test_seeds_take_voxelizations_in_turn_from_roomy_to_full(tmp_path):
+    path = tmp_path / "block.stl"
+    trimesh.creation.box((60.0, 40.0, 20.0)).export(path)
+    kit = Kit.from_model(path, template="box-3x3x3", effort="quick", seed=3, workers=1)
+    sizes = [len(voxels) for voxels in kit.voxelize()]
+    assert len(set(sizes)) > 1
+    rounds = kit._rounds()
+    turns = [len(rounds.voxels(30000 + k)) for k in range(2 * len(sizes))]
+    assert sorted(turns[: len(sizes)]) == sorted(sizes), "each comes once before any comes again"
+    assert turns[: len(sizes)] == turns[len(sizes) :]
+    assert turns[0] == min(sizes)
+    half = (len(sizes) + 1) // 2
+    assert turns[:half] == sorted(turns[:half])
+    # What a seed finds joins the voxels that it was given.
+    for voxels, candidate in next(rounds.found()):
+        assert voxels is rounds.voxels(candidate.seed)
+        assert np.array_equal(candidate.tree.source, voxels.cells)

@@ -19,7 +19,7 @@ from fabfold.voxels.placement import (
     rank_translations,
 )
 from fabfold.voxels.scan import summed_volume
-from fabfold.voxels.search import voxelize
+from fabfold.voxels.search import shares_of, voxelize
 from fabfold.voxels.store import save_voxels
 
 QUICK = {"placements": 12, "shortlist": 4, "results": 3}
@@ -117,13 +117,26 @@ def test_sphere_and_torus_fit_and_hang_together(name):
         assert len(results[0]) >= 0.75 * len(template)
 
 
-def test_results_are_different_and_some_leave_room():
+def test_results_are_different_and_of_several_sizes():
     template = load_template("box-3x3x3")
     results = voxelize(torus(), template, placements=30, shortlist=12, results=4)
     assert len(results) == 4
     keys = {tuple(np.sort(voxels.fill).tolist()) for voxels in results}
     assert len(keys) == 4
-    assert min(len(voxels) for voxels in results) <= 0.94 * len(template)
+    for voxels in results:
+        check(voxels, template)
+    # One for each share of the 14 + 13 cells, which are 1, 0.95, 0.9 and 0.85.
+    sizes = sorted(len(voxels) for voxels in results)
+    most = [int(share * 14) + int(share * 13) for share in shares_of(27)[::-1]]
+    assert most == [22, 23, 25, 27]
+    assert all(size <= limit for size, limit in zip(sizes, most, strict=True))
+
+
+def test_larger_templates_are_left_emptier():
+    assert shares_of(8) == (1.0,)
+    assert shares_of(64) == pytest.approx((1.0, 14 / 15, 13 / 15, 0.8))
+    least = [shares_of(cells)[-1] for cells in (64, 125, 216, 512)]
+    assert least == pytest.approx([0.8, 0.75, 0.7, 0.6])
 
 
 def test_the_same_seed_gives_the_same_bytes(tmp_path):
