@@ -161,6 +161,15 @@ JointsInside = Annotated[
         show_default=False,
     ),
 ]
+Share = Annotated[
+    bool | None,
+    typer.Option(
+        "--share/--no-share",
+        help="Two partly filled voxels may share a cell of the box where their material does not "
+        "overlap. Default: no.",
+        show_default=False,
+    ),
+]
 Pick = Annotated[
     int | None,
     typer.Option("--pick", min=0, help="Go on with this solution of 'fit --pareto'; 0 unpicks."),
@@ -284,6 +293,7 @@ def _stage(name: str, summary: str) -> None:
         joints: Joints = None,
         double_weight: DoubleWeight = None,
         joints_inside: JointsInside = None,
+        share: Share = None,
         pick: Pick = None,
         workers: Workers = None,
         scheduler: Scheduler = None,

@@ -103,6 +103,9 @@ class Recipe(BaseModel):
     joints_inside: Annotated[
         bool, Field(description="no hinge on the visible faces of the box")
     ] = False
+    share: Annotated[
+        bool, Field(description="two voxels may share a cell where their material allows it")
+    ] = False
     pick: Annotated[
         int, Field(ge=0, le=1000, description="solution of the Pareto list; 0 is the best tree")
     ] = 0

@@ -347,6 +347,7 @@ class Rounds:
                 bias=self.wishes.bias(voxels, self.template),
                 stiff=uncut_pairs(uncut, joints),
                 joints=self.recipe.joints,
+                share=self.recipe.share,
             )
             problem = self.wishes.apply(problem, voxels, self.template)
             if self.template.creases:

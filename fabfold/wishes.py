@@ -128,7 +128,8 @@ def wished(recipe: Recipe) -> list[Any]:
         "joints_inside": recipe.joints_inside,
         "void": recipe.void,
         "prefer": recipe.prefer,
+        "share": recipe.share,
     }
     idle = {"keep": [], "keep_weight": 0.0, "protect": [], "joints_inside": False, "void": 0.0}
-    usual = {**idle, "prefer": 0.5, "joints": "S", "double_weight": 0.12}
+    usual = {**idle, "prefer": 0.5, "joints": "S", "double_weight": 0.12, "share": False}
     return [[name, value] for name, value in fields.items() if value != usual[name]]

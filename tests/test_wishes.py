@@ -116,6 +116,8 @@ def test_words_are_numbers_and_move_the_weights():
     recipe = make_recipe(model="sample:car", template="box-3x4x4")
     assert weights_of(recipe) == Weights(surface=0.3, single=0.1, double=0.12)
     assert wished(recipe) == []
+    # What shares cells depends on it, what does not keeps the results that it has.
+    assert wished(recipe.model_copy(update={"share": True})) == [["share", True]]
     few = weights_of(recipe.model_copy(update={"prefer": 0.0}))
     fine = weights_of(make_recipe(model="sample:car", template="box-3x4x4", prefer="surface"))
     assert few.single / few.surface == pytest.approx(16 * 0.1 / 0.3)

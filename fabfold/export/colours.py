@@ -96,7 +96,7 @@ def palette(count: int) -> NDArray[np.uint8]:
 
 
 def _neighbours(tree: FoldTree) -> NDArray[np.bool_]:
-    """Bodies that share a hinge, or whose cells share a face in A or in B."""
+    """Bodies that share a hinge, or whose cells share a face in A or in B, or are one."""
     count = len(tree.bodies)
     beside = np.zeros((count, count), dtype=bool)
     for hinge in tree.hinges:
@@ -104,7 +104,7 @@ def _neighbours(tree: FoldTree) -> NDArray[np.bool_]:
     owner = tree.voxel_body
     for cells in (tree.source, tree.target):
         apart = np.abs(cells[:, None].astype(int) - cells[None]).sum(axis=2)
-        first, second = np.nonzero(apart == 1)
+        first, second = np.nonzero(apart <= 1)
         beside[owner[first], owner[second]] = True
     beside |= beside.T
     np.fill_diagonal(beside, False)

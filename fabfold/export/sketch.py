@@ -9,7 +9,7 @@ from fabfold.export.colours import body_colours
 from fabfold.export.picture import strip
 from fabfold.export.render import Image, View
 from fabfold.fold.model import Motion
-from fabfold.joinery.cells import eroded_cells, model_manifold
+from fabfold.joinery.cells import eroded_room, model_manifold
 from fabfold.joinery.model import BodyMesh, Joinery
 from fabfold.tree.model import FoldTree
 from fabfold.voxels.model import Voxels
@@ -27,7 +27,9 @@ def _pieces(voxels: Voxels, tree: FoldTree) -> tuple[tuple[BodyMesh, ...], NDArr
         if not body.voxels:  # a link plate, which has no thickness yet
             vertices, faces = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)
         else:
-            cut = model ^ eroded_cells(tree.source[list(body.voxels)], _VOXEL, _GAP / 2)
+            own = list(body.voxels)
+            octants = None if tree.octants is None else tree.octants[own]
+            cut = model ^ eroded_room(tree.source[own], octants, _VOXEL, _GAP / 2)
             mesh = cut.to_mesh64()
             vertices = np.asarray(mesh.vert_properties, dtype=float)[:, :3]
             faces = np.asarray(mesh.tri_verts, dtype=np.int32)

@@ -225,6 +225,7 @@ def _rebuilt(
         root_rotation=orientation[first],
         root_translation=(target[first] - orientation[first] @ tree.source[first]).astype(np.int32),
         energy=dict(tree.energy),
+        octants=tree.octants,
     )
     return final, order, sign
 

@@ -59,7 +59,7 @@ class LatticeFoldability:
         For trees that fold only once cells lose corners: half the side of the core that is to be
         left of a cell, :data:`fabfold.fold.cores.CORE`. The closure test then looks at cores; the
         planner looks at whole cells first, and at cores where it leaves little. Not together with
-        `octants`.
+        `octants`. A system whose voxels share cells brings its own octants and is not carved.
     material : (n, s, s, s) bool array, optional
         With `carve`: material of the cells in shape A. Paths that cannot be carved without
         cutting a hinge then do not count, and of several the one that costs least is taken.
@@ -130,7 +130,9 @@ class LatticeFoldability:
         patience = min(expansions, self.patience)
         seen = self._seen(system)
         found = find_path(seen, self.expansions, patience, short=False, guide=guide)
-        if self.carve is None or not 0 < found.levels <= max(LITTLE, NEAR * found.total):
+        if self.carve is None or system.octants is not None:
+            return found
+        if not 0 < found.levels <= max(LITTLE, NEAR * found.total):
             return found
         cored = self._look_at_cores(system, patience, found.guide)
         return cored if cored.levels < found.levels else found
@@ -184,7 +186,7 @@ class LatticeFoldability:
                     return found
             if guide is None:
                 break
-        if self.carve is None:
+        if self.carve is None or system.octants is not None:
             return None
         if self.material is not None:
             from fabfold.fold.carving import carved_path

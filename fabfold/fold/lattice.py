@@ -4,6 +4,9 @@ Every hinge axis is an edge of the lattice, so every state in which all hinges s
 of 90° has its cubes on the lattice. A move turns one hinge by 90°, and whether it collides is
 read from a table of the cells that a turning cube sweeps (:mod:`fabfold.fold.sweep`).
 
+Where voxels share cells of B, eighths of cells count in place of cells (:func:`refined`), and
+nothing is carved.
+
 A state is valid when no two cells coincide and no two hinge barrels lie on one lattice edge, and a
 turn is free when no cell and no barrel that it carries runs into one that stays.
 """
@@ -103,6 +106,9 @@ def _guide_out(system: HingeSystem, mech: Mechanism, steps: NDArray[np.int16]) -
 
 
 def _ready(system: HingeSystem, carve: float | None = None) -> tuple[Mechanism, Scene, SweepTable]:
+    if system.octants is not None:
+        # Hinges keep their numbers, so that what comes out is of the system as it was.
+        system, carve = refined(system, system.octants), None
     mech = mechanism(system)
     halves = len(mech.barrel) != len(mech.up)
     if carve is None:
@@ -202,6 +208,8 @@ def find_path(
     -------
     Plan
     """
+    if system.octants is not None:
+        carve = None
     mech, at, table = _ready(system, carve)
     whole = table if carve is None else sweep_table(mech.span)
     total = int(mech.steps.sum())

@@ -21,6 +21,7 @@ from fabfold.fold.model import Motion
 from fabfold.fold.motion import end_pose_error, quarter_path
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.model import FoldTree
+from fabfold.tree.sharing import WHOLE, unpacked
 from fabfold.tree.system import hinge_system
 
 if TYPE_CHECKING:
@@ -92,6 +93,8 @@ def material_boxes(
         Voxels that were carved so that they pass each other: a box cannot follow a round, so the
         box is about what lies in the core of the cell.
 
+    Of a voxel that shares its cell in B there is a box about the material in each eighth.
+
     Returns
     -------
     list of (body, low, high)
@@ -114,20 +117,29 @@ def material_boxes(
             )
         )
         for voxel in body.voxels:
-            cell = tree.source[voxel].astype(float)
             reach = CORE if voxel in interlocked else half
-            piece = solid
-            for axis in range(3):
-                for sign in (1.0, -1.0):
-                    normal = [0.0, 0.0, 0.0]
-                    normal[axis] = sign
-                    piece = piece.trim_by_plane(normal, float(sign * cell[axis]) - reach)
-            if piece.is_empty():
-                continue
-            box = np.array(piece.bounding_box())
-            if (box[3:] - box[:3]).min() > 1e-6:
-                found.append((index, box[:3], box[3:]))
+            for middle, most in _parts(tree, voxel, reach):
+                piece = solid
+                for axis in range(3):
+                    for sign in (1.0, -1.0):
+                        normal = [0.0, 0.0, 0.0]
+                        normal[axis] = sign
+                        piece = piece.trim_by_plane(normal, float(sign * middle[axis]) - most)
+                if piece.is_empty():
+                    continue
+                box = np.array(piece.bounding_box())
+                if (box[3:] - box[:3]).min() > 1e-6:
+                    found.append((index, box[:3], box[3:]))
     return found
+
+
+def _parts(tree: FoldTree, voxel: int, reach: float) -> list[tuple[F64, float]]:
+    """Middle and half side of the cubes that hold a voxel's material: its cell, or eighths."""
+    cell = tree.source[voxel].astype(float)
+    if tree.octants is None or tree.octants[voxel] == WHOLE:
+        return [(cell, reach)]
+    sides = np.argwhere(unpacked(tree.octants[voxel : voxel + 1])[0])
+    return [(cell + side / 2 - 0.25, reach - 0.25) for side in sides]
 
 
 def _sheet(
@@ -207,7 +219,7 @@ def _model(tree: FoldTree, boxes: list[tuple[int, F64, F64]]) -> mujoco.MjModel:
 def _interlocked(tree: FoldTree, motion: Motion) -> set[int]:
     """Voxels that run into others as whole cells, on a path from state to state of the lattice."""
     path = quarter_path(tree, motion)
-    if path is None:
+    if path is None or tree.octants is not None:
         return set()
     return {v for m in meetings_on(hinge_system(tree), path) for v in (m.first, m.second)}
 

@@ -13,7 +13,7 @@ from fabfold.errors import GeometryError
 from fabfold.fold.barrels import first_encounter
 from fabfold.fold.model import Motion
 from fabfold.joinery.carving import Carved, carve
-from fabfold.joinery.cells import eroded_cells, model_manifold
+from fabfold.joinery.cells import eroded_cells, eroded_room, model_manifold
 from fabfold.joinery.cutting import Cut, less, meeting, united
 from fabfold.joinery.grooves import Passage, passages
 from fabfold.joinery.links import link_body
@@ -25,6 +25,7 @@ from fabfold.joinery.soundness import finish_mesh
 from fabfold.joinery.unite import CRUMB_SHARE, Tally, one_piece
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.model import FoldTree
+from fabfold.tree.sharing import WHOLE
 from fabfold.voxels.model import Voxels
 
 if TYPE_CHECKING:
@@ -157,6 +158,11 @@ def _notes(tally: Tally, voxel_mm: float, links: int) -> tuple[str, ...]:
             f"{tally.links_mm3:.0f} mm³ taken out of {tally.links_cut} of {links} link plates so "
             "that hinge barrels and other links can pass"
         )
+    if tally.shared_cells:
+        notes.append(
+            f"{tally.shared_cells} voxels share {tally.shared_cells // 2} cells of the box, two "
+            f"and two; {tally.shared_mm3:.0f} mm³ cut off them so that each keeps to its eighths"
+        )
     if tally.hollows:
         notes.append(
             f"{tally.hollows} closed hollows filled, {tally.filled_mm3:.0f} mm³ in all: "
@@ -218,9 +224,9 @@ def _body(
     cut: Cut, model: manifold3d.Manifold, rounded: Carved, tally: Tally
 ) -> manifold3d.Manifold:
     """One body as one connected solid, lattice origin at zero."""
-    voxel_mm, size = cut.voxel_mm, cut.size
+    voxel_mm = cut.voxel_mm
     cells = cut.tree.source[list(cut.tree.bodies[cut.index].voxels)]
-    room = eroded_cells(cells, voxel_mm, size.clearance_mm / 2)
+    room = _room(cut, cells, model, tally)
     own = cut.fitted.halves[cut.index]
     carves = [item.carve for item in own]
     rounds = rounded.tools.get(cut.index, [])
@@ -248,6 +254,23 @@ def _body(
         return less(room, [*carves, *shut, *meeting([*grooves, *pockets], room)])
 
     return one_piece(cut.name, cells, free, material, halves, voxel_mm, tally)
+
+
+def _room(
+    cut: Cut, cells: NDArray[np.int32], model: manifold3d.Manifold, tally: Tally
+) -> manifold3d.Manifold:
+    """Where the body may be: its cells, and of those that are shared in B its own eighths."""
+    inset = cut.size.clearance_mm / 2
+    whole = eroded_cells(cells, cut.voxel_mm, inset)
+    if cut.tree.octants is None:
+        return whole
+    octants = cut.tree.octants[list(cut.tree.bodies[cut.index].voxels)]
+    if (octants == WHOLE).all():
+        return whole
+    room = eroded_room(cells, octants, cut.voxel_mm, inset)
+    tally.shared_cells += int((octants != WHOLE).sum())
+    tally.shared_mm3 += (model ^ (whole - room)).volume()
+    return room
 
 
 def _count_cells(

@@ -126,7 +126,8 @@ def carve(
         If a hinge would be cut.
     """
     path = quarter_path(tree, motion)
-    if path is None:
+    if path is None or tree.octants is not None:
+        # A path past voxels that share cells is planned on eighths, and nothing gives way.
         return Carved()
     planned = plan_carving(hinge_system(tree), path, voxels.subvoxels)
     if planned.blocked:

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
+from fabfold.tree.sharing import WHOLE, unpacked
 from fabfold.voxels.model import Voxels
 
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["as_manifold", "eroded_cells", "model_manifold", "occupancy"]
+__all__ = ["as_manifold", "eroded_cells", "eroded_room", "model_manifold", "occupancy"]
 
 #: Shift of the scan lines in `occupancy`, as a share of the pitch: rays that run through the
 #: vertices and edges of axis-aligned boxes would meet degenerate hits.
@@ -100,6 +101,36 @@ def eroded_cells(cells: NDArray[np.int32], voxel_mm: float, inset_mm: float) -> 
             corner = (np.array(cell) - 0.5) * voxel_mm + inset_mm
             boxes.append(manifold3d.Manifold.cube(tuple(size)).translate(tuple(corner)))
     return manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add)
+
+
+def eroded_room(
+    cells: NDArray[np.int32],
+    octants: NDArray[np.uint8] | None,
+    voxel_mm: float,
+    inset_mm: float,
+) -> manifold3d.Manifold:
+    """As :func:`eroded_cells`, of a body that may have some of its cells in part only.
+
+    Parameters
+    ----------
+    cells : (m, 3) int32 array
+        The body's cells in lattice units.
+    octants : (m,) uint8 array or None
+        Which eighths of each cell are its own, see ``FoldTree.octants``; None for all.
+    voxel_mm, inset_mm : float
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In mm.
+    """
+    if octants is None or (octants == WHOLE).all():
+        return eroded_cells(cells, voxel_mm, inset_mm)
+    kept = np.argwhere(unpacked(octants))
+    halves = (2 * cells[kept[:, 0]] + kept[:, 1:]).astype(np.int32)
+    # The half cell 0 begins where the cell 0 does, so its centre is a quarter of a cell below 0.
+    room = eroded_cells(halves, voxel_mm / 2, inset_mm)
+    return room.translate((-voxel_mm / 4,) * 3)
 
 
 def _inside_larger(

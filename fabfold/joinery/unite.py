@@ -29,6 +29,8 @@ class Tally:
 
     carved_cells: int = 0
     carved_mm3: float = 0.0
+    shared_cells: int = 0
+    shared_mm3: float = 0.0
     dropped_mm3: float = 0.0
     crumbs: int = 0
     hollows: int = 0

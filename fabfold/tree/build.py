@@ -12,6 +12,7 @@ from fabfold.tree.grow import doubles_needed, energy_of
 from fabfold.tree.model import Body, Edge, FoldTree, Hinge
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.rebuild import COLUMNS, candidates, hinge_rows, rooted, spanning_tree
+from fabfold.tree.sharing import shared_octants, unpacked
 from fabfold.tree.system import HingeSystem
 from fabfold.tree.wedge import hinge_tables
 
@@ -52,12 +53,15 @@ class HingeChoice:
     clusters : int
     found : (k, 24) int32 array
         Possible hinges, see :func:`fabfold.tree.rebuild.candidates`.
+    octants : (n,) uint8 array or None
+        See :func:`fabfold.tree.sharing.shared_octants`.
     """
 
     problem: TreeProblem
     label: NDArray[np.int32]
     clusters: int
     found: NDArray[np.int32]
+    octants: NDArray[np.uint8] | None = None
 
     def wanted(self, keys: set[tuple[int, int]], bonus: float) -> NDArray[np.float64]:
         """Preference (smaller is sooner) for hinges between the voxel pairs of `keys`."""
@@ -91,6 +95,7 @@ class HingeChoice:
             point2=point2,
             axis=axis,
             turns=turns,
+            octants=None if self.octants is None else unpacked(self.octants),
         )
         return SpanningTree(system, joints)
 
@@ -100,7 +105,13 @@ def hinge_choice(problem: TreeProblem, pose: NDArray[np.int32]) -> HingeChoice:
     label = np.empty(len(problem), np.int32)
     found = np.empty((hinge_rows(problem.tables), COLUMNS), np.int32)
     total, rows = candidates(problem.tables, pose, hinge_tables(), label, found)
-    return HingeChoice(problem, label, total, found[:rows])
+    return HingeChoice(problem, label, total, found[:rows], _octants(problem, pose))
+
+
+def _octants(problem: TreeProblem, pose: NDArray[np.int32]) -> NDArray[np.uint8] | None:
+    if problem.tables.shares == 0:
+        return None
+    return shared_octants(pose, problem.tables.mask[:, 0])
 
 
 def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree) -> FoldTree:
@@ -172,6 +183,7 @@ def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree)
             "total": float(total),
             **({} if problem.bias is None else {"wishes": wished}),
         },
+        octants=_octants(problem, pose),
     )
 
 

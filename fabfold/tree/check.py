@@ -20,13 +20,14 @@ __all__ = ["check_tree"]
 def check_tree(tree: FoldTree) -> list[str]:
     """Everything that is wrong with a tree, in words; an empty list when nothing is.
 
-    Checked: distinct cells in A and in B; target cells in the template; the edges span the
-    voxels and join face neighbours; bodies are exactly the voxels that R edges join; hinges in
-    order, on the lattice edge of the face that their voxels share; turns of 90, 180 or 270
-    degrees that open the face; a double hinge joins parent, link plate and child in this order,
-    on two edges; no voxel has two double hinges; forward kinematics carries every voxel to its
-    target and orientation; no two hinges on one lattice edge segment and no two link plates on one
-    lattice face in A or in B.
+    Checked: distinct cells in A, and in B too but for pairs of voxels in different eighths of one
+    cell, whose hinges are single and lie in their own eighths; target cells in the template; the
+    edges span the voxels and join face neighbours; bodies are exactly the voxels that R edges
+    join; hinges in order, on the lattice edge of the face that their voxels share; turns of 90,
+    180 or 270 degrees that open the face; a double hinge joins parent, link plate and child in
+    this order, on two edges; no voxel has two double hinges; forward kinematics carries every
+    voxel to its target and orientation; no two hinges on one lattice edge segment and no two link
+    plates on one lattice face in A or in B.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ def check_tree(tree: FoldTree) -> list[str]:
     found = _bodies(tree) or _hinges(tree)
     if found:
         return found
-    return _kinematics(tree) + _senses(tree) + _segments(tree) + _plates(tree)
+    return _kinematics(tree) + _senses(tree) + _segments(tree) + _plates(tree) + _guests(tree)
 
 
 def _shapes(tree: FoldTree) -> list[str]:
@@ -57,6 +58,8 @@ def _shapes(tree: FoldTree) -> list[str]:
         "orientation": (tree.orientation, (count, 3, 3)),
         "fill": (tree.fill, (count,)),
     }
+    if tree.octants is not None:
+        wanted["octants"] = (tree.octants, (count,))
     return [
         f"{name} has shape {array.shape}, wanted {shape}"
         for name, (array, shape) in wanted.items()
@@ -71,13 +74,68 @@ def _repeated(cells: NDArray[np.int32]) -> list[tuple[int, ...]]:
 
 def _cells(tree: FoldTree) -> list[str]:
     found = [f"two voxels share source cell {cell}" for cell in _repeated(tree.source)]
-    found += [f"two voxels share target cell {cell}" for cell in _repeated(tree.target)]
+    found += _shared(tree)
     template = {tuple(cell) for cell in tree.template.cells.tolist()}
     found += [
         f"voxel {i}: target cell {tuple(cell)} is outside template {tree.template.name!r}"
         for i, cell in enumerate(tree.target.tolist())
         if tuple(cell) not in template
     ]
+    return found
+
+
+def _corners(tree: FoldTree, voxel: int) -> set[tuple[int, ...]]:
+    """The eighths that a voxel keeps to, by the corner of its cell in A, -1 and 1."""
+    bits = 255 if tree.octants is None else int(tree.octants[voxel])
+    sides = list(itertools.product((-1, 1), repeat=3))
+    return {side for k, side in enumerate(sides) if bits >> k & 1}
+
+
+def _shared(tree: FoldTree) -> list[str]:
+    """Voxels in one cell of B must be two, in different eighths of it."""
+    together: dict[tuple[int, ...], list[int]] = {}
+    for voxel, cell in enumerate(tree.target.tolist()):
+        together.setdefault(tuple(cell), []).append(voxel)
+    found = []
+    for cell, voxels in together.items():
+        if len(voxels) > 2:
+            found.append(f"{len(voxels)} voxels share target cell {cell}")
+        elif len(voxels) == 2:
+            first, second = (
+                {tuple((tree.orientation[v] @ corner).tolist()) for corner in _corners(tree, v)}
+                for v in voxels
+            )
+            if first & second or not (first and second):
+                found.append(
+                    f"voxels {voxels[0]} and {voxels[1]} share target cell {cell}, and "
+                    f"{len(first & second)} of its eighths"
+                )
+        elif len(_corners(tree, voxels[0])) < 8:
+            found.append(f"voxel {voxels[0]} has eighths of a cell that nobody shares")
+    return found
+
+
+def _guests(tree: FoldTree) -> list[str]:
+    """Hinges of voxels that share a cell must lie beside two eighths of theirs."""
+    found = []
+    for number, edge in enumerate(tree.edges):
+        for voxel in (edge.parent, edge.child):
+            own = _corners(tree, voxel)
+            if len(own) == 8:
+                continue
+            if edge.kind == "D":
+                found.append(f"edge {number}: voxel {voxel} shares its cell and has a double hinge")
+                continue
+            for hinge in (tree.hinges[h] for h in edge.hinges):
+                edge_at = np.rint(2 * (np.array(hinge.point) - tree.source[voxel])).astype(int)
+                across = np.flatnonzero(edge_at)
+                touched = {
+                    corner
+                    for corner in itertools.product((-1, 1), repeat=3)
+                    if all(corner[a] == edge_at[a] for a in across)
+                }
+                if not touched <= own:
+                    found.append(f"{hinge.name}: voxel {voxel} shares the eighths beside it")
     return found
 
 

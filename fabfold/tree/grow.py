@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import mix, random_float
+from fabfold.tree.room import clash, close, occupy, saved, seen_twice
 
 __all__ = ["clusters", "doubles_needed", "energy_of", "fill_beam", "pieces"]
 
@@ -84,7 +85,8 @@ def doubles_needed(tables: Tables, pose: NDArray[np.int32]) -> int:
 def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tuple[float, int]:
     """Weighted energy of a full set of poses and its number of rigid clusters.
 
-    Clusters that single hinges alone would leave apart cost the weight of a double hinge.
+    Clusters that single hinges alone would leave apart cost the weight of a double hinge. A
+    visible face of a cell with two voxels counts by its nearer material, see :func:`seen_twice`.
 
     Parameters
     ----------
@@ -93,7 +95,7 @@ def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tup
     """
     label = np.empty(len(pose), np.int32)
     found = clusters(tables, pose, label)
-    taken = np.zeros(len(tables.cells), np.bool_)
+    taken = np.full(len(tables.cells), -1, np.int32)
     total = tables.weight[1] * (found - 1)
     if tables.single + 1 < len(tables.weight):
         more = tables.weight[tables.single + 1] - tables.weight[1]
@@ -101,9 +103,12 @@ def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tup
     for v in range(len(pose)):
         if pose[v] >= 0:
             total += np.float64(tables.cost[v, pose[v]])
-            taken[pose[v] // 24] = True
+            w = taken[pose[v] // 24]
+            if w >= 0:
+                total -= seen_twice(tables, v, pose[v], w, pose[w])
+            taken[pose[v] // 24] = v
     for cell in range(len(taken)):
-        if not taken[cell]:
+        if taken[cell] < 0:
             for f in range(6):
                 if tables.around[cell, f] < 0:
                     total += empty_face
@@ -114,7 +119,7 @@ def energy_of(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> tup
 def _survey(
     tables: Tables,
     pose: NDArray[np.int32],
-    taken: NDArray[np.bool_],
+    taken: NDArray[np.uint8],
     todo: NDArray[np.int32],
     priority: NDArray[np.float64],
     mark: NDArray[np.int32],
@@ -126,11 +131,12 @@ def _survey(
     """Pick the most constrained voxel that can be placed next; -1 when the state is dead.
 
     A state is dead when a voxel has no place left, or when the free cells that the frontier can
-    reach are fewer than the voxels left. A lenient survey overlooks that, and returns -1 only
-    when nothing can be placed.
+    reach are fewer than the voxels left that need a whole one. A lenient survey overlooks that, and
+    returns -1 only when nothing can be placed.
     """
     best = -1
     best_key = 1e18
+    mask = tables.mask
     whole = len(tables.stiff) > 0
     left = 0
     seeds = 0
@@ -139,7 +145,8 @@ def _survey(
         v = todo[k]
         if pose[v] >= 0:
             continue
-        left += 1
+        if mask[v, 0] == 255:
+            left += 1
         stamp[0] += 1
         found = 0
         placed = 0
@@ -160,7 +167,7 @@ def _survey(
                 if not tables.allowed[u, g, j]:
                     continue
                 q = tables.step[g, j, parent]
-                if q < 0 or taken[q // 24] or mark[q] == stamp[0]:
+                if q < 0 or mark[q] == stamp[0] or clash(taken[q // 24], mask, v, q):
                     continue
                 mark[q] = stamp[0]
                 if whole and not keeps_whole(tables, pose, v, q):
@@ -191,7 +198,7 @@ def _survey(
             head += 1
             for f in range(6):
                 other = tables.around[cell, f]
-                if other >= 0 and not taken[other] and reach[other] != stamp[1]:
+                if other >= 0 and taken[other] != 255 and reach[other] != stamp[1]:
                     reach[other] = stamp[1]
                     reach[len(taken) + seeds] = other
                     seeds += 1
@@ -277,7 +284,9 @@ def fill_beam(
     whole = len(tables.stiff) > 0
     pose = np.empty((2, width, count), np.int32)
     label = np.empty((2, width, count), np.int32)
-    taken = np.zeros((2, width, room), np.bool_)
+    mask = tables.mask
+    taken = np.zeros((2, width, room), np.uint8)
+    shared = np.zeros((2, width), np.int32)
     score = np.zeros((2, width))
     key = np.zeros((2, width), np.uint64)
     pick = np.empty((2, width), np.int32)
@@ -299,7 +308,9 @@ def fill_beam(
     clusters(tables, start, label[0, 0])
     for v in range(count):
         if start[v] >= 0:
-            taken[0, 0, start[v] // 24] = True
+            shared[0, 0] += occupy(taken[0, 0], mask, v, start[v])
+    if shared[0, 0] >= tables.shares:
+        close(taken[0, 0])
     flood = len(todo) > 8 and not lenient
     pick[0, 0] = _survey(
         tables, pose[0, 0], taken[0, 0], todo, priority, mark, stamp, reach, flood, lenient
@@ -330,7 +341,9 @@ def fill_beam(
                     if not tables.allowed[u, g, j]:
                         continue
                     q = tables.step[g, j, here[u]]
-                    if q < 0 or taken[now, b, q // 24] or mark[q] == stamp[0]:
+                    if q < 0 or mark[q] == stamp[0]:
+                        continue
+                    if clash(taken[now, b, q // 24], mask, v, q):
                         continue
                     mark[q] = stamp[0]
                     if whole and not keeps_whole(tables, here, v, q):
@@ -343,6 +356,8 @@ def fill_beam(
                     delta += joint_share * tables.weight[1] * (1 - merged)
                     if f >= 6:
                         delta += SCARCE
+                    if taken[now, b, q // 24] != 0:
+                        delta -= saved(tables, here, v, q)
                     from_state[options] = b
                     to_pose[options] = q
                     plain[options] = score[now, b] + delta
@@ -373,7 +388,13 @@ def fill_beam(
             pose[nxt, kept] = pose[now, b]
             taken[nxt, kept] = taken[now, b]
             pose[nxt, kept, v] = q
-            taken[nxt, kept, q // 24] = True
+            shared[nxt, kept] = shared[now, b]
+            if occupy(taken[nxt, kept], mask, v, q) != 0:
+                shared[nxt, kept] += 1
+                if shared[nxt, kept] == tables.shares:
+                    close(taken[nxt, kept])
+            elif shared[nxt, kept] == tables.shares:
+                taken[nxt, kept, q // 24] = 255
             if not last:
                 pick[nxt, kept] = _survey(
                     tables,

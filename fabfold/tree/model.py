@@ -84,6 +84,10 @@ class FoldTree:
         Rigid motion of the whole that carries the folded root body into the template.
     energy : dict of str to float
         ``surface`` (Eq. 8), ``count`` (Eq. 9) and ``total`` (weighted).
+    octants : (n,) uint8 array or None
+        Where two voxels share a cell of B: the eighths of its cell in A that each of them keeps to
+        (bit ``4 x + 2 y + z``, see :mod:`fabfold.tree.sharing`), 255 for a voxel with a cell of
+        its own. None where no voxel shares.
     """
 
     template: Template
@@ -97,6 +101,7 @@ class FoldTree:
     root_rotation: NDArray[np.int32]
     root_translation: NDArray[np.int32]
     energy: dict[str, float]
+    octants: NDArray[np.uint8] | None = None
 
     @property
     def joints(self) -> dict[str, int]:
@@ -179,6 +184,7 @@ class FoldTree:
                 "rotation": self.root_rotation.reshape(9).tolist(),
                 "translation": self.root_translation.tolist(),
             },
+            **({} if self.octants is None else {"octants": self.octants.tolist()}),
         }
 
     @classmethod
@@ -224,6 +230,9 @@ class FoldTree:
                 root_rotation=np.array(data["root_pose"]["rotation"], dtype=np.int32).reshape(3, 3),
                 root_translation=np.array(data["root_pose"]["translation"], dtype=np.int32),
                 energy=dict(data["energy"]),
+                octants=(
+                    np.array(data["octants"], dtype=np.uint8) if data.get("octants") else None
+                ),
             )
         except (KeyError, TypeError, ValueError) as error:
             raise KitError(f"tree.json: field missing or malformed: {error!r}") from error

@@ -279,7 +279,7 @@ def _restricted(
         there = tables.step[cut.face, 0, cut.poses]
         step[cut.face, 0, cut.poses] = there
         step[cut.face ^ 1, 0, there] = cut.poses
-    cost, centre = _shown_when_folded(problem, parts, depth)
+    cost, centre, shown = _shown_when_folded(problem, parts, depth)
     own = parts.part[None, :] == group[:, None]
     cost += np.where(np.repeat(own, 24, axis=1), 0.0, MISPLACED).astype(np.float32)
     for cut in cuts:
@@ -296,6 +296,7 @@ def _restricted(
             hinged=_hinged(template, parts),
             cost=cost,
             centre=centre,
+            exposed=shown,
         ),
         roots=roots,
     )
@@ -333,8 +334,8 @@ def _hinged(template: Template, parts: Parts) -> NDArray[np.int32]:
 
 def _shown_when_folded(
     problem: TreeProblem, parts: Parts, depth: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Costs of the poses with the faces that the folded shape shows, not the flat template."""
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
+    """Costs of the poses with the faces that the folded shape shows, and these faces."""
     template = problem.template
     landed = parts.landed(template.cells)
     grid = np.zeros(landed.max(axis=0) + 3, dtype=bool)
@@ -349,4 +350,5 @@ def _shown_when_folded(
     return (
         problem.tables.cost + (after[0] - before[0]),
         problem.tables.centre + (after[1] - before[1]),
+        shown,
     )

@@ -13,6 +13,14 @@ from numpy.typing import NDArray
 from fabfold.errors import NoTreeError
 from fabfold.lattice import FACES, ROTATION_PRODUCT, ROTATIONS, Template, parity
 from fabfold.tree.catalogue import Joint, JointSet, joint_rows, ways
+from fabfold.tree.sharing import (
+    WHOLE,
+    beside,
+    most_shared,
+    octant_masks,
+    seen_depths,
+    turned_masks,
+)
 
 if TYPE_CHECKING:
     from fabfold.voxels.features import Features
@@ -81,6 +89,16 @@ class Tables(NamedTuple):
     source : (n, 3) int32 array
     cells : (m, 3) int32 array
     rotations : (24, 3, 3) int32 array
+    mask : (n, 24) uint8 array
+        Eighths of its cell that a voxel must have in each rotation, see
+        :mod:`fabfold.tree.sharing`; all 255 where no voxel may share.
+    shares : int
+        Most cells that may hold two voxels; 0 where none may.
+    seen : (n, 24, 6, 4) float32 array
+        Weighted ray depth of each quarter of each face, in each rotation; no rows where no voxel
+        may share.
+    beside : (6, 6) uint8 array
+        Eighths beside the edge of two faces of a cell.
     """
 
     neighbour: NDArray[np.int32]
@@ -99,6 +117,10 @@ class Tables(NamedTuple):
     source: NDArray[np.int32]
     cells: NDArray[np.int32]
     rotations: NDArray[np.int32]
+    mask: NDArray[np.uint8]
+    shares: int
+    seen: NDArray[np.float32]
+    beside: NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -158,6 +180,12 @@ class TreeProblem:
             way_start=np.ascontiguousarray(tables.way_start[:, : last + 1]),
         )
 
+    def shareable(self, colour: NDArray[np.integer]) -> tuple[int, int]:
+        """Most pairs of voxels of each colour that may share a cell."""
+        partial = self.tables.mask[:, 0] != WHOLE
+        pairs = [int((partial & (colour == c)).sum()) // 2 for c in (0, 1)]
+        return min(pairs[0], self.tables.shares), min(pairs[1], self.tables.shares)
+
     @property
     def keeps_colour(self) -> bool:
         """Whether every joint in use keeps the checkerboard colour of a cell."""
@@ -176,10 +204,20 @@ class TreeProblem:
         """
         if not self.keeps_colour:
             return [0, 1]
-        odd = int(parity(self.source).sum())
+        colour = parity(self.source)
+        odd = int(colour.sum())
         voxels = (len(self.source) - odd, odd)
         cells = self.template.colours
-        fits = [c for c in (0, 1) if voxels[0] <= cells[c] and voxels[1] <= cells[1 - c]]
+        # Two voxels that share a cell are of one colour.
+        spare = self.shareable(colour)
+        short = [(voxels[0] - cells[c], voxels[1] - cells[1 - c]) for c in (0, 1)]
+        fits = [
+            c
+            for c, (first, second) in enumerate(short)
+            if first <= spare[0]
+            and second <= spare[1]
+            and max(first, 0) + max(second, 0) <= self.tables.shares
+        ]
         if not fits:
             raise NoTreeError(
                 f"the voxels have {voxels[0]} cells of one checkerboard colour and {voxels[1]} of "
@@ -275,6 +313,7 @@ def tree_problem(
     stiff: NDArray[np.bool_] | None = None,
     double: NDArray[np.bool_] | None = None,
     joints: JointSet = "S",
+    share: NDArray[np.bool_] | None = None,
 ) -> TreeProblem:
     """Problem from plain arrays; :func:`from_features` takes the voxel stage's results.
 
@@ -303,6 +342,9 @@ def tree_problem(
         Whether the shared face has room for the link plate of a double hinge; by default none has.
     joints : str
         Joint types in use, see :data:`fabfold.tree.catalogue.JOINT_SETS`.
+    share : (n, s, s, s) bool array, optional
+        Material in each cell: two voxels may take one template cell where their eighths allow it.
+        Without it every voxel has a cell of its own.
 
     Raises
     ------
@@ -312,7 +354,9 @@ def tree_problem(
     weights = weights or Weights()
     cells = np.asarray(cells, dtype=np.int32).reshape(-1, 3)
     count = len(cells)
-    if count == 0 or count > len(template):
+    masks = np.full(count, WHOLE, np.uint8) if share is None else octant_masks(share)
+    shares = 0 if share is None else min(most_shared(count), int((masks != WHOLE).sum()) // 2)
+    if count == 0 or count > len(template) + shares:
         raise NoTreeError(
             f"{count} voxels cannot go into template {template.name!r} of {len(template)} cells: "
             "take a larger template or a coarser grid"
@@ -369,6 +413,14 @@ def tree_problem(
         # A template's own cells are read-only, which would be another signature to the kernels.
         cells=template.cells.copy(),
         rotations=ROTATIONS,
+        mask=turned_masks(masks) if shares else np.full((count, 24), WHOLE, np.uint8),
+        shares=shares,
+        seen=(
+            seen_depths(share, weights.surface)
+            if shares and share is not None
+            else np.zeros((0, 24, 6, 4), np.float32)
+        ),
+        beside=beside().copy(),
     )
     return TreeProblem(
         template=template,
@@ -390,6 +442,7 @@ def from_features(
     bias: NDArray[np.floating] | None = None,
     stiff: NDArray[np.bool_] | None = None,
     joints: JointSet = "S",
+    share: bool = False,
 ) -> TreeProblem:
     """Problem from a voxelization, its printable joints and a template.
 
@@ -401,6 +454,8 @@ def from_features(
         See :func:`tree_problem`; ``k`` are the pairs of `features`.
     joints : str
         Joint types in use, see :data:`fabfold.tree.catalogue.JOINT_SETS`.
+    share : bool
+        Whether two voxels may take one cell where their material allows it.
 
     Raises
     ------
@@ -420,6 +475,7 @@ def from_features(
         stiff=stiff,
         double=features.double,
         joints=joints,
+        share=voxels.subvoxels if share else None,
     )
 
 

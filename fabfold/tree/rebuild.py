@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fabfold.tree.grow import clusters, pieces
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_float
+from fabfold.tree.room import find_guests
 from fabfold.tree.wedge import HingeTables, blocked, double_blocked
 
 __all__ = [
@@ -79,6 +80,23 @@ def _edge_in_template(
 
 
 @njit(cache=True)
+def _hinge_fits(
+    tables: Tables, guest: NDArray[np.bool_], u: int, v: int, f: int, side: int, double: bool
+) -> bool:
+    """Whether a hinge leaves alone what its voxels share: see :func:`candidates`."""
+    if not guest[u] and not guest[v]:
+        return True
+    if double:
+        return False
+    # Rotation 0 is shape A.
+    first = tables.beside[f, side]
+    second = tables.beside[f ^ 1, side]
+    if guest[u] and (tables.mask[u, 0] & first) != first:
+        return False
+    return not guest[v] or (tables.mask[v, 0] & second) == second
+
+
+@njit(cache=True)
 def _resting_edge(
     tables: Tables,
     q: int,
@@ -101,7 +119,7 @@ def _resting_edge(
 
 
 @njit(cache=True)
-def candidates(  # noqa: PLR0912 - one row of the table after the other
+def candidates(  # noqa: PLR0912, PLR0915 - one row of the table after the other
     tables: Tables,
     pose: NDArray[np.int32],
     hinges: HingeTables,
@@ -110,7 +128,9 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
 ) -> tuple[int, int]:
     """Rigid clusters and the hinges that could join them.
 
-    Hinges whose turn would run the two clusters into each other are left out.
+    Hinges whose turn would run the two clusters into each other are left out. So are those of a
+    voxel that shares its cell, but for single hinges in its own eighths: knuckles and bracket need
+    the two beside the edge.
 
     Parameters
     ----------
@@ -145,6 +165,10 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
     plate = np.empty(3, np.int32)
     first = np.empty(3, np.int32)
     second = np.empty(3, np.int32)
+    guest = np.zeros(count, np.bool_)
+    sharing = tables.shares > 0
+    if sharing:
+        find_guests(tables, pose, guest)
     rows = 0
     for u in range(count):
         for f in range(0, 6, 2):
@@ -164,6 +188,9 @@ def candidates(  # noqa: PLR0912 - one row of the table after the other
                 turns = tables.way[w, 1]
                 double = tables.way[w, 2] >= 0
                 if not _resting_edge(tables, pose[u], d, n, first):
+                    continue
+                side = hinges.sides[f, tables.way[w, 0]]
+                if sharing and not _hinge_fits(tables, guest, u, v, f, side, double):
                     continue
                 if not double:
                     table = hinges.swept if turns == 2 else hinges.quarter

@@ -12,6 +12,7 @@ from fabfold.tree.grow import clusters, energy_of, fill_beam
 from fabfold.tree.problem import Tables
 from fabfold.tree.rebuild import COLUMNS, apart, candidates, hinge_rows, loose_pieces
 from fabfold.tree.rng import random_below, random_float
+from fabfold.tree.room import holders, one_of
 from fabfold.tree.wedge import HingeTables
 
 __all__ = ["propose", "repair", "ruin"]
@@ -39,8 +40,8 @@ def ruin(
     ----------
     label : (n,) int32 array
         Rigid cluster of each voxel.
-    holder : (m,) int32 array
-        Voxel in each template cell, -1 for none.
+    holder : (m, 2) int32 array
+        Voxels in each template cell, -1 for none.
     focus : (k,) int32 array
         Voxels to start from; empty for all.
     least, most : int
@@ -78,13 +79,16 @@ def ruin(
                 if q < 0:
                     continue
                 sitting = holder[q // 24]
-                if sitting >= 0 and label[sitting] == here:
+                if sitting[0] >= 0 and label[sitting[0]] == here:
+                    continue
+                if sitting[1] >= 0 and label[sitting[1]] == here:
                     continue
                 out[v] = True
                 chosen += 1
-                if sitting >= 0 and not out[sitting]:
-                    out[sitting] = True
-                    chosen += 1
+                for w in sitting:
+                    if w >= 0 and not out[w]:
+                        out[w] = True
+                        chosen += 1
                 if chosen >= want:
                     return chosen
         # The rest comes from the edges of what is already out.
@@ -107,7 +111,7 @@ def ruin(
         f = random_below(generator, 6)
         if in_template:
             cell = tables.around[pose[u] // 24, f]
-            v = holder[cell] if cell >= 0 else -1
+            v = one_of(holder, cell, generator) if cell >= 0 else -1
         else:
             v = tables.neighbour[u, f]
         if v >= 0 and not out[v]:
@@ -205,9 +209,8 @@ def propose(
     count = len(pose)
     label = np.empty(count, np.int32)
     clusters(tables, pose, label)
-    holder = np.full(len(tables.cells), -1, np.int32)
-    for v in range(count):
-        holder[pose[v] // 24] = v
+    holder = np.empty((len(tables.cells), 2), np.int32)
+    holders(tables, pose, holder)
     gone = np.empty(count, np.bool_)
     hinge = np.empty((hinge_rows(tables), COLUMNS), np.int32)
     new_label = np.empty(count, np.int32)
@@ -275,13 +278,13 @@ def _patch(
     if len(homeless) > 0:
         edge[0] = homeless[random_below(generator, len(homeless))]
         size = 1
-    empty = np.flatnonzero(holder < 0)
+    empty = np.flatnonzero(holder[:, 0] < 0)
     if len(empty) > 0:
         cell = empty[random_below(generator, len(empty))]
         for f in range(6):
             other = tables.around[cell, f]
-            if other >= 0 and holder[other] >= 0 and random_float(generator) < 0.6:
-                v = holder[other]
+            if other >= 0 and holder[other, 0] >= 0 and random_float(generator) < 0.6:
+                v = one_of(holder, other, generator)
                 if not out[v]:
                     out[v] = True
                     edge[size] = v
@@ -298,7 +301,7 @@ def _patch(
         v = tables.neighbour[u, f]
         if pose[u] >= 0 and random_float(generator) < 0.5:
             cell = tables.around[pose[u] // 24, f]
-            v = holder[cell] if cell >= 0 else -1
+            v = one_of(holder, cell, generator) if cell >= 0 else -1
         if v >= 0 and not out[v] and pose[v] >= 0:
             out[v] = True
             edge[size] = v
@@ -336,10 +339,8 @@ def repair(
         Removals tried.
     """
     count = len(pose)
-    holder = np.full(len(tables.cells), -1, np.int32)
-    for v in range(count):
-        if pose[v] >= 0:
-            holder[pose[v] // 24] = v
+    holder = np.empty((len(tables.cells), 2), np.int32)
+    holders(tables, pose, holder)
     gone = np.empty(count, np.bool_)
     results = np.empty((width, count), np.int32)
     start = np.empty(count, np.int32)
@@ -368,8 +369,5 @@ def repair(
         if best_row >= 0 and (best <= left or random_float(generator) < 0.002):
             left = best
             pose[:] = results[best_row]
-            holder[:] = -1
-            for v in range(count):
-                if pose[v] >= 0:
-                    holder[pose[v] // 24] = v
+            holders(tables, pose, holder)
     return left, used

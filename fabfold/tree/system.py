@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.tree.model import FoldTree
+from fabfold.tree.sharing import unpacked
 
 __all__ = ["HingeSystem", "hinge_system"]
 
@@ -32,6 +33,9 @@ class HingeSystem(NamedTuple):
         0, 1 or 2: the axis runs along +x, +y or +z.
     turns : (h,) int8 array
         Signed quarter turns about the positive axis from A to B.
+    octants : (n, 2, 2, 2) bool array or None
+        Where voxels share cells of B: which eighths of each cell, in shape A, count as taken. None
+        where every voxel has a cell of its own; then whole cells count.
     """
 
     cells: NDArray[np.int32]
@@ -40,6 +44,7 @@ class HingeSystem(NamedTuple):
     point2: NDArray[np.int32]
     axis: NDArray[np.int8]
     turns: NDArray[np.int8]
+    octants: NDArray[np.bool_] | None = None
 
 
 def hinge_system(tree: FoldTree) -> HingeSystem:
@@ -56,4 +61,5 @@ def hinge_system(tree: FoldTree) -> HingeSystem:
         point2=np.rint(2 * points).astype(np.int32),
         axis=axis,
         turns=(quarter * sign).astype(np.int8),
+        octants=None if tree.octants is None else unpacked(tree.octants),
     )

@@ -323,7 +323,9 @@ def _emptiness(tree: FoldTree) -> dict[str, Any]:
         )
         if open_
     }
-    full = {tuple(cell): float(f) for cell, f in zip(tree.target.tolist(), tree.fill, strict=True)}
+    full: dict[tuple[int, ...], float] = {}
+    for cell, share in zip(tree.target.tolist(), tree.fill.tolist(), strict=True):
+        full[tuple(cell)] = full.get(tuple(cell), 0.0) + share
     empty = [0.0, 0.0]
     for cell in tree.template.cells.tolist():
         empty[tuple(cell) in visible] += 1.0 - full.get(tuple(cell), 0.0)
