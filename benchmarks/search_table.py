@@ -154,13 +154,16 @@ def spread(values: list[float], form: str = "{:.0f}") -> str:
 
 
 def at_mark(entries: list[dict[str, Any]], mark: float) -> list[str]:
-    """Joints and energy of the best trees at a mark; dashes where a run was shorter."""
-    if any(length(run) < mark for run in entries):
+    """Joints and energy of the best trees at a mark, of the runs that were as long."""
+    long = [run for run in entries if length(run) >= mark]
+    if not long:
         return ["–", "–"]
-    best = [best_at(run, mark) for run in entries]
+    best = [best_at(run, mark) for run in long]
+    some = "" if len(long) == len(entries) else f" of {len(long)}"
     return [
-        spread([float("inf") if event is None else joints_of(event) for event in best]),
-        spread([float("inf") if event is None else event["total"] for event in best], "{:.2f}"),
+        spread([float("inf") if event is None else joints_of(event) for event in best]) + some,
+        spread([float("inf") if event is None else event["total"] for event in best], "{:.2f}")
+        + some,
     ]
 
 
@@ -316,10 +319,10 @@ def table(data: dict[str, Any], facts: dict[str, Any]) -> str:
         "*Joints* and *energy* (paper's weights): the best of all seeds, the median seed's in",
         f"brackets, after {MARKS[0]:g} s and {MARKS[1]:g} s of {MARK_CORES} cores for all "
         f"{len(SEEDS)} seeds together:",
-        f"each run then had {CORE_MARKS[0]:g} and {CORE_MARKS[1]:g} seconds of its core; – where "
-        "runs were shorter,",
-        "or there was no tree yet. *Voxels*: sizes of the voxelizations that seeds take in turn,",
-        "from roomy to full ones; *voxels of the best*: joined by the best tree at the end of a",
+        f"each run then had {CORE_MARKS[0]:g} and {CORE_MARKS[1]:g} seconds of its core (*of 3*: "
+        "only three seeds",
+        "were searched as long; –: none was, or there was no tree yet). *Voxels*: sizes of the",
+        "voxelizations that seeds take in turn, from roomy to full ones; *voxels of the best*: joined by the best tree at the end of a",
         "run, the median.",
         "",
         "*Proven*, *sampled*: smallest gap of all trees of the row by the swept test, and seen by",
