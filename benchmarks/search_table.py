@@ -322,8 +322,8 @@ def table(data: dict[str, Any], facts: dict[str, Any]) -> str:
         f"each run then had {CORE_MARKS[0]:g} and {CORE_MARKS[1]:g} seconds of its core (*of 3*: "
         "only three seeds",
         "were searched as long; –: none was, or there was no tree yet). *Voxels*: sizes of the",
-        "voxelizations that seeds take in turn, from roomy to full ones; *voxels of the best*: joined by the best tree at the end of a",
-        "run, the median.",
+        "voxelizations that seeds take in turn, from roomy to full ones; *voxels of the best*:",
+        "joined by the best tree at the end of a run, the median.",
         "",
         "*Proven*, *sampled*: smallest gap of all trees of the row by the swept test, and seen by",
         "the other check. *Best certified*: of the best trees that were put to the proof (where",
