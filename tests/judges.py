@@ -27,7 +27,8 @@ class Results:
 
 
 def mark_of(system):
-    return hashlib.sha256(b"".join(np.asarray(part).tobytes() for part in system)).hexdigest()
+    parts = (np.asarray(part).tobytes() for part in system if part is not None)
+    return hashlib.sha256(b"".join(parts)).hexdigest()
 
 
 class Recording(LatticeFoldability):
@@ -68,9 +69,12 @@ class Deadly(LatticeFoldability):
         self.__dict__.update(folder=str(folder), deaths=deaths)
 
     def path(self, system, guide=None):
-        dead = Path(self.folder)
-        if len(list(dead.iterdir())) < self.deaths:
-            (dead / str(os.getpid())).touch()
+        for number in range(self.deaths):
+            # Two workers may ask at once; each death is for one of them.
+            try:
+                (Path(self.folder) / str(number)).touch(exist_ok=False)
+            except FileExistsError:
+                continue
             os.kill(os.getpid(), signal.SIGKILL)
         return super().path(system, guide)
 
