@@ -361,7 +361,7 @@ def main() -> None:
     )
     parser.add_argument(
         "--prove",
-        nargs="+",
+        nargs="*",
         default=["first", "best"],
         choices=["first", "best"],
         help="trees of each run to build and prove",
