@@ -69,7 +69,9 @@ def missing(options: argparse.Namespace, names: list[str]) -> list[tuple[str, st
 
 
 def unproven(options: argparse.Namespace, names: list[str]) -> list[tuple[str, str, int]]:
-    out = []
+    out: list[tuple[str, str, int]] = []
+    if not options.prove:
+        return out
     for seed in options.seeds:
         for name in names:
             for joints in options.joints:
@@ -364,7 +366,7 @@ def main() -> None:
         nargs="*",
         default=["first", "best"],
         choices=["first", "best"],
-        help="trees of each run to build and prove",
+        help="trees of each run to build and prove; nothing proves none",
     )
     parser.add_argument("--only-table", action="store_true")
     parser.add_argument("--out", type=Path, default=HERE / "search_table.md")
