@@ -29,6 +29,7 @@ RUNS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("front kept, weight 1", {"keep": (FRONT,), "keep_weight": 1.0}),
     ("wheels whole", {"protect": WHEELS}),
     ("front and wheels", {"protect": WHEELS, "keep": (FRONT,), "keep_weight": 1.0}),
+    ("joints inside", {"joints_inside": True}),
     ("prefer hinges", {"prefer": "hinges"}),
     ("prefer surface", {"prefer": "surface"}),
 )
