@@ -51,7 +51,7 @@ class Effort:
     """
 
     beam: int = 10
-    roots: int = 1000
+    roots: int = 100
     restarts: int = 12
     removals: int = 30000
     closing: int = 8
@@ -72,7 +72,7 @@ class Effort:
 
 #: Effort by name, as the command line offers it.
 EFFORTS: dict[str, Effort] = {
-    "quick": Effort(restarts=6, gathering=1, polishing=200),
+    "quick": Effort(roots=40, restarts=6, gathering=1, polishing=200),
     "normal": Effort(),
-    "thorough": Effort(restarts=60, gathering=30, polishing=20000),
+    "thorough": Effort(roots=400, restarts=60, gathering=30, polishing=20000),
 }

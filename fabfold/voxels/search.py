@@ -28,6 +28,8 @@ _NEARBY = 0.5
 _REFINED = 6
 #: Pitches to go on with, in twentieths of the ranked ones, where none of the second round fits.
 _LARGER = ((22, 23), (24, 25), (26, 28), (30, 33), (36, 40))
+#: Placements of one size that are cut, until as many as wanted will do.
+_TRIES = 16
 #: Two voxelizations whose sorted fills differ by less than this on average are the same.
 _SAME_FILL = 0.012
 #: Voxelizations of different size that are looked for, and how much of a template the smallest
@@ -141,14 +143,15 @@ def voxelize(
             some = ranked if centre is not None else ranked[:shortlist]
             found = _tried(rounds, some, free, centre is not None, regions)
             done = _finish(rounds, found, chosen, count, max_loss, regions)
-            if not done:
-                raise NoVoxelsError(_nearest(rounds, found, max_loss))
+            full = found
         else:
             roomy = rounds.with_share(share)
             again = roomy.again(ranked, pitches * share ** (-1 / 3))
             found = _tried(roomy, again[: max(1, shortlist // _FEWER)], free, False, regions)
             done += _finish(roomy, found, chosen, count, max_loss, regions)
         progress.update(0.4 + 0.6 * (place + 1) / len(shares), f"{len(done)} voxelizations")
+    if not done:
+        raise NoVoxelsError(_nearest(rounds, full, max_loss))
     return [voxels for _, voxels in sorted(done, key=lambda pair: pair[0])]
 
 
@@ -316,7 +319,7 @@ def _finish(
     """
     done: list[tuple[float, Voxels]] = []
     # Sampling the warped model can still cost a cell its place, so some more than are wanted.
-    for tried in _shortlist(rounds, found, chosen, 2 * count):
+    for tried in _shortlist(rounds, found, chosen, _TRIES) or found[:_TRIES]:
         voxels, _, _ = cut_voxels(
             rounds.vertices, rounds.faces, tried.placement, rounds.energy, rounds.capacity
         )
