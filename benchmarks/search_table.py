@@ -32,6 +32,11 @@ MARK_CORES = 2
 CORE_MARKS = tuple(mark * MARK_CORES / len(SEEDS) for mark in MARKS)
 
 
+def core_seconds(mark: float) -> float:
+    """Processor seconds of each run at a mark, when all seeds of a row run side by side."""
+    return mark * MARK_CORES / len(SEEDS)
+
+
 def path_of(work: Path, kind: str, name: str, joints: str, seed: int) -> Path:
     return work / kind / f"{name}-{joints}-{seed}.json"
 
@@ -157,7 +162,7 @@ def spread(values: list[float], form: str = "{:.0f}") -> str:
 
 def at_mark(entries: list[dict[str, Any]], mark: float) -> list[str]:
     """Joints and energy of the best trees at a mark, of the runs that were as long."""
-    long = [run for run in entries if length(run) >= mark]
+    long = [run for run in entries if length(run) >= mark - 0.5]
     if not long:
         return ["–", "–"]
     best = [best_at(run, mark) for run in long]
@@ -186,7 +191,15 @@ def told_range(values: list[int]) -> str:
     return f"{low}" if low == high else f"{low}–{high}"
 
 
-def row(name: str, joints: str, by_seed: dict[str, Any]) -> str:
+def marks_of(measured: list[dict[str, Any]]) -> tuple[float, ...]:
+    """Marks that any of some runs reaches; the end of the longest where that is none."""
+    longest = max((length(run) for run in measured), default=CORE_MARKS[0])
+    return tuple(m for m in MARKS if core_seconds(m) <= longest + 0.5) or (
+        round(longest * len(SEEDS) / MARK_CORES),
+    )
+
+
+def row(name: str, joints: str, by_seed: dict[str, Any], marks: tuple[float, ...]) -> str:
     model, entries = MODELS[name], list(by_seed.values())
     if all("error" in run for run in entries):
         return f"| {name} | {joints} | {model.template} | | {entries[0]['error']} |"
@@ -202,8 +215,8 @@ def row(name: str, joints: str, by_seed: dict[str, Any]) -> str:
         worst,
         f"{model.aim_seconds:g}" if model.aim_seconds else "–",
     ]
-    for mark in CORE_MARKS:
-        cells += at_mark(entries, mark)
+    for mark in marks:
+        cells += at_mark(entries, core_seconds(mark))
     sizes = [voxels_of(run, run["events"][-1]) for run in entries if run["events"]]
     cells.append(f"{median(sizes):.0f}" if sizes else "–")
     proofs = [p for run in entries if run["proof"] for p in run["proof"]["tried"].values()]
@@ -224,9 +237,9 @@ def row(name: str, joints: str, by_seed: dict[str, Any]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def head() -> list[str]:
+def head(marks: tuple[float, ...]) -> list[str]:
     cells = ["model", "joints", "voxels", "certified", "first s, median", "worst", "aim"]
-    for mark in MARKS:
+    for mark in marks:
         cells += [f"joints {mark:g} s", f"energy {mark:g} s"]
     cells += ["voxels of the best", "best certified", "refused", "aim", "paper", "paper core-h"]
     cells += ["proven mm", "sampled mm", "build s", "voxels s"]
@@ -334,14 +347,10 @@ def table(data: dict[str, Any], facts: dict[str, Any]) -> str:
         f"Machine: {runs.machine_line(facts)}.",
     ]
     for title, names in (("The paper's models", PAPER), ("Ten other models", DEV)):
-        rows = [
-            row(name, joints, data[name][joints])
-            for name in names
-            if name in data
-            for joints in data[name]
-        ]
-        if rows:
-            lines += ["", f"## {title}", "", *head(), *rows]
+        kinds = [(n, joints, data[n][joints]) for n in names if n in data for joints in data[n]]
+        marks = marks_of([r for *_, runs_of in kinds for r in runs_of.values() if "error" not in r])
+        if kinds:
+            lines += ["", f"## {title}", "", *head(marks), *(row(*kind, marks) for kind in kinds)]
     lines += compared(data) + refusals(data)
     return "\n".join(lines) + "\n"
 
