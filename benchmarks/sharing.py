@@ -59,25 +59,19 @@ def searched(voxels: Voxels, template: str, share: bool, seeds: int) -> list[Run
 
 def proven(voxels: Voxels, candidate: Candidate) -> str:
     """The certified gap of the bodies of a tree, or why there is none."""
+    from fabfold.attempt import Attempt, build
     from fabfold.errors import FabfoldError
-    from fabfold.fold.certify import certify
     from fabfold.fold.motion import motion_of
-    from fabfold.joinery.build import build_bodies
+    from fabfold.printing.profiles import load_profile
+    from fabfold.progress import SilentProgress
 
-    tree, motion = candidate.tree, motion_of(candidate.tree, candidate.path)
+    profile = load_profile("sla-tough").model_copy(update={"clearance_mm": 0.3, "min_gap_mm": 0.25})
+    attempt = Attempt(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
     try:
-        joinery = build_bodies(voxels, tree, motion, voxel_mm=20.0, clearance_mm=0.3)
-        certificate = certify(
-            tree,
-            motion,
-            [(body.vertices, body.faces) for body in joinery.bodies],
-            voxel_mm=joinery.voxel_mm,
-            origin_mm=joinery.origin_mm,
-            min_gap_mm=0.25,
-        )
+        made = build(attempt, profile, 20.0, (), SilentProgress())
     except FabfoldError as error:
         return str(error)
-    return f"{certificate['min_gap_mm']:.3f} mm"
+    return f"{made.attempt.motion.certificate['min_gap_mm']:.3f} mm"
 
 
 def main() -> None:

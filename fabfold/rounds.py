@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fabfold.errors import NoFoldError, NoTreeError, RecipeError
@@ -162,7 +162,7 @@ class Rounds:
         self._key = key
         self._shelf = Shelf(store)
         self._listening = listening
-        self._jobs: dict[tuple[int, bool], Job | SeedResult] = {}
+        self._jobs: dict[int, Job | SeedResult] = {}
         self._done: dict[int, list[Found]] = {}
         self._ranked: list[Found] | None = None
 
@@ -326,15 +326,18 @@ class Rounds:
 
     def job(self, seed: int) -> Job | SeedResult:
         """What a seed searches, or its result where its voxelization rules every tree out."""
-        number = (seed - self._seeds(0)[0]) // SEEDS_PER_ROUND
-        kind = (self._option(seed), self._carves(number))
         if self.template.creases:
-            return self._made(seed, kind[1])  # the faces of the parts depend on the seed
-        if kind not in self._jobs:
-            self._jobs[kind] = self._made(seed, kind[1])
-        return self._jobs[kind]
+            return self._made(seed)  # the faces of the parts depend on the seed
+        option = self._option(seed)
+        if option not in self._jobs:
+            self._jobs[option] = self._made(seed)
+        job = self._jobs[option]
+        if isinstance(job, Job) and self._carves((seed - self._seeds(0)[0]) // SEEDS_PER_ROUND):
+            judge = LatticeFoldability(carve=CORE, material=self.voxels(seed).subvoxels)
+            return replace(job, foldability=judge)
+        return job
 
-    def _made(self, seed: int, carves: bool) -> Job | SeedResult:
+    def _made(self, seed: int) -> Job | SeedResult:
         voxels = self.voxels(seed)
         joints = features(voxels)
         uncut = self.wishes.uncut(voxels, joints, self.template)
@@ -354,10 +357,7 @@ class Rounds:
                 problem = parted(problem, seed, joints.depth)
         except NoTreeError as error:
             return SeedResult((), fits=False, why=str(error))
-        judge = LatticeFoldability()
-        if carves:
-            judge = LatticeFoldability(carve=CORE, material=voxels.subvoxels)
-        return Job(problem, judge, EFFORTS[self.recipe.effort])
+        return Job(problem, LatticeFoldability(), EFFORTS[self.recipe.effort])
 
     def _carves(self, number: int) -> bool:
         """Whether cells may be cut in this round: where whole ones do not fold, every second one.

@@ -141,7 +141,7 @@ def run_seeds(
         Polled often.
     """
     waiting = iter(tasks)
-    again: list[tuple[int, Job | SeedResult]] = []
+    again: list[tuple[int, Job]] = []
     running: dict[int, Job] = {}
     best: dict[int, Candidate] = {}
     losses: Counter[int] = Counter()
@@ -173,11 +173,12 @@ def run_seeds(
             task = again.pop(0) if again else next(waiting, None)
             if task is None:
                 break
-            if isinstance(task[1], SeedResult):
-                hear(Done(task[0], task[1]))
+            seed, job = task
+            if isinstance(job, SeedResult):
+                hear(Done(seed, job))
                 continue
-            running[task[0]] = task[1]
-            pool.submit(task[1], task[0])
+            running[seed] = job
+            pool.submit(job, seed)
         if not running and (told is not None or not again):
             break
         if told is not None and told.over():

@@ -16,10 +16,12 @@ JointSpec = tuple[str, tuple[int, ...], tuple[int, ...]]
 RIGID: JointSpec = ("R", (), ())
 
 
-def hand_tree(cells: list[list[int]], joints: list[tuple[int, int, JointSpec]]) -> FoldTree:
+def hand_tree(
+    cells: list[list[int]], joints: list[tuple[int, int, JointSpec]], *, share: bool = False
+) -> FoldTree:
     """Tree of cells from joints (parent, child, spec), parents first; voxel 0 is the root's.
 
-    The template is wherever the cells come to lie.
+    The template is wherever the cells come to lie; two in one only if they `share` it.
     """
     source = np.array(cells, dtype=np.int32)
     owner = {0: 0}
@@ -76,7 +78,7 @@ def hand_tree(cells: list[list[int]], joints: list[tuple[int, int, JointSpec]]) 
     )
     poses = blank.body_poses(blank.fold_angles)[blank.voxel_body]
     target = np.rint(np.einsum("nij,nj->ni", poses[:, :3, :3], source) + poses[:, :3, 3])
-    if len(np.unique(target, axis=0)) < len(target):
+    if not share and len(np.unique(target, axis=0)) < len(target):
         raise ValueError(f"two cells come to lie in one: {target.tolist()}")
     shift = -target.min(axis=0).astype(np.int32)
     return replace(

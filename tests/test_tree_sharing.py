@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from double_models import RIGID, hand_tree
 from joinery_models import posed, voxels_of
 from tree_cases import face_pairs, solid_problem, strip
 
@@ -21,6 +22,7 @@ from fabfold.joinery.build import build_bodies
 from fabfold.joinery.cells import eroded_cells, eroded_room
 from fabfold.lattice import FACES, ROTATIONS, load_template
 from fabfold.tree.build import hinge_choice
+from fabfold.tree.catalogue import edge_sides
 from fabfold.tree.check import check_tree
 from fabfold.tree.effort import Effort
 from fabfold.tree.grow import energy_of, fill_beam
@@ -34,7 +36,8 @@ from fabfold.tree.sharing import (
     turned_masks,
     unpacked,
 )
-from fabfold.tree.solve import grow, solve
+from fabfold.tree.solve import solve
+from fabfold.tree.starts import grow
 from fabfold.tree.system import hinge_system
 from fabfold.voxels.features import features
 
@@ -320,10 +323,20 @@ def test_checker_refuses_what_must_not_share(folded):
     lone = tree.octants.copy()
     lone[5] = 15
     assert said(lone, "nobody shares")
-    narrow = tree.octants.copy()
-    narrow[10] = 1 << 6 | 1 << 7
-    if any(10 in (edge.parent, edge.child) and edge.hinges for edge in tree.edges):
-        assert said(narrow, "shares the eighths beside it")
+
+
+def test_checker_wants_hinges_in_the_eighths_of_their_voxels():
+    # The second voxel stands on the first, and the third turns up beside it onto the second.
+    faces = FACES.tolist()
+    side = edge_sides(faces.index([1, 0, 0])).index(faces.index([0, 0, 1]))
+    joints = [(0, 1, RIGID), (0, 2, ("S", (side,), (2,)))]
+    tree = hand_tree([[0, 0, 0], [0, 0, 1], [1, 0, 0]], joints, share=True)
+    assert tree.target[1].tolist() == tree.target[2].tolist()
+    low, high = 0b00001111, 0b11110000  # sides along x; the half turn swaps them
+    beside = replace(tree, octants=np.array([255, low, low], dtype=np.uint8))
+    assert check_tree(beside) == []
+    away = replace(tree, octants=np.array([255, high, high], dtype=np.uint8))
+    assert check_tree(away) == [f"{tree.hinges[0].name}: voxel 2 shares the eighths beside it"]
 
 
 def test_bodies_of_a_shared_cell_keep_apart(built):

@@ -139,16 +139,14 @@ def voxelize(
     done: list[tuple[float, Voxels]] = []
     for place, share in enumerate(shares):
         count = len(range(place, results, len(shares)))
+        here, some = rounds, ranked if centre is not None else ranked[:shortlist]
+        if place > 0:
+            here = rounds.with_share(share)
+            some = here.again(ranked, pitches * share ** (-1 / 3))[: max(1, shortlist // _FEWER)]
+        found = _tried(here, some, free, centre is not None, regions)
+        done += _finish(here, found, chosen, count, max_loss, regions)
         if place == 0:
-            some = ranked if centre is not None else ranked[:shortlist]
-            found = _tried(rounds, some, free, centre is not None, regions)
-            done = _finish(rounds, found, chosen, count, max_loss, regions)
             full = found
-        else:
-            roomy = rounds.with_share(share)
-            again = roomy.again(ranked, pitches * share ** (-1 / 3))
-            found = _tried(roomy, again[: max(1, shortlist // _FEWER)], free, False, regions)
-            done += _finish(roomy, found, chosen, count, max_loss, regions)
         progress.update(0.4 + 0.6 * (place + 1) / len(shares), f"{len(done)} voxelizations")
     if not done:
         raise NoVoxelsError(_nearest(rounds, full, max_loss))
