@@ -86,7 +86,7 @@ class Unjudged(Unplanned, Unclosed):
 def changed(variant: str, job: Any, voxels: Any) -> Any:
     """The job of a seed as a variant has it."""
     from fabfold.fold.cores import CORE
-    from fabfold.fold.foldability import LatticeFoldability, octants_of
+    from fabfold.fold.lattice_foldability import LatticeFoldability, octants_of
 
     effort, judge = job.effort, job.foldability
     if variant == "no improvement":
@@ -121,7 +121,7 @@ def run_variant(
     model: runs.Model, folder: Path, variant: str, seed: int, joints: str, seconds: float
 ) -> dict[str, Any]:
     """One run of one variant: the product's seeds, one after the other."""
-    from fabfold.seeds import Job, run_seed
+    from fabfold.search.seeds import Job, run_seed
 
     kit = runs.voxelized(model, folder)
     options = kit.voxelize()
@@ -199,7 +199,7 @@ def grown_in_order(problem: Any, start: Any, order: list[int], beam: int, state:
 
 def run_growth(model: runs.Model, folder: Path, variant: str, seed: int, joints: str) -> Any:
     """Grow from the same root poses, one way or the other."""
-    from fabfold.lattice import parity
+    from fabfold.lattice.rotations import parity
     from fabfold.tree.grow import fill_beam
     from fabfold.tree.rng import generator
     from fabfold.tree.ruin import repair

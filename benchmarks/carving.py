@@ -55,8 +55,8 @@ class Recorder:
 def near_misses(voxels: Any, template: str, count: int) -> list[Any]:
     """Hinge systems that pass the closure test and that the planner does not fold."""
     from fabfold.errors import NoFoldError, NoTreeError
-    from fabfold.fold.foldability import LatticeFoldability
-    from fabfold.lattice import load_template
+    from fabfold.fold.lattice_foldability import LatticeFoldability
+    from fabfold.lattice.shipped import load_template
     from fabfold.tree.effort import Effort
     from fabfold.tree.problem import from_features
     from fabfold.tree.solve import solve
@@ -81,8 +81,8 @@ def near_misses(voxels: Any, template: str, count: int) -> list[Any]:
 def tree_of(system: Any) -> Any:
     """Fold tree of a hinge system of single hinges."""
     from fabfold.fold.reference import poses
-    from fabfold.lattice import Template
-    from fabfold.tree.model import Body, Edge, FoldTree, Hinge
+    from fabfold.lattice.template import Template
+    from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
 
     cells, owner = np.asarray(system.cells), np.asarray(system.body)
     index = {tuple(cell): i for i, cell in enumerate(cells.tolist())}
@@ -147,9 +147,9 @@ def tree_of(system: Any) -> Any:
 def prove(voxels: Any, system: Any, path: Any) -> str:
     """Build and certify; what came out, in words."""
     from fabfold.errors import FabfoldError
-    from fabfold.fold.certify import certify
     from fabfold.fold.motion import motion_of
     from fabfold.joinery.build import build_bodies
+    from fabfold.proof.certify import certify
 
     tree = tree_of(system)
     motion = motion_of(tree, path)
@@ -176,11 +176,11 @@ def prove(voxels: Any, system: Any, path: Any) -> str:
 
 def main() -> None:
     """Command line."""
-    from fabfold.fold.carving import carved_path
+    from fabfold.fold.carving_plan import carved_path
     from fabfold.fold.cores import CORE
-    from fabfold.fold.foldability import LatticeFoldability
-    from fabfold.fold.lattice import find_path
-    from fabfold.voxels.store import load_voxels
+    from fabfold.fold.lattice_foldability import LatticeFoldability
+    from fabfold.fold.lattice_paths import find_path
+    from fabfold.voxels.voxel_files import load_voxels
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("voxels", type=Path)

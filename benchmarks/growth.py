@@ -47,18 +47,18 @@ def name_of(side: int) -> str:
 
 def do_solid(model: str, folder: Path) -> None:
     """In a process of its own too: CAD kernels and mesh repair take more memory than the rest."""
-    from fabfold.solid.load import load_solid
-    from fabfold.stagefiles import save_solid
+    from fabfold.kit.stage_files import save_solid
+    from fabfold.samples.catalogue import load_model
     from fabfold.store import StageStore
 
-    save_solid(StageStore(folder), load_solid(model))
+    save_solid(StageStore(folder), load_model(model))
 
 
 def do_voxelize(side: int, seed: int, folder: Path) -> None:
-    from fabfold.lattice import load_template
-    from fabfold.stagefiles import load_solid, save_options
+    from fabfold.kit.stage_files import load_solid, save_options
+    from fabfold.lattice.shipped import load_template
     from fabfold.store import StageStore
-    from fabfold.voxels.search import voxelize
+    from fabfold.voxels.voxelize import voxelize
 
     solid = load_solid(StageStore(folder), ["solid.npz"])
     voxelize(solid, load_template(name_of(3)), seed=seed, placements=2, shortlist=1, results=1)
@@ -108,12 +108,12 @@ def do_tree(
     model: str, side: int, seed: int, folder: Path, budget: float, files: list[str]
 ) -> None:
     """The product's seeds, one after the other, until one folds."""
-    from fabfold.kit import Kit
-    from fabfold.seeds import Job, run_seed
-    from fabfold.stagefiles import load_options
+    from fabfold.kit.kit import Kit
+    from fabfold.kit.stage_files import load_options
+    from fabfold.search.seeds import Job, run_seed
+    from fabfold.search.warmup import strip_job
     from fabfold.store import StageStore
     from fabfold.tree.starts import grow
-    from fabfold.warming import strip_job
 
     kit = Kit.from_model(model, template=name_of(side), seed=seed)
     options = load_options(StageStore(folder / str(side)), files)

@@ -14,8 +14,8 @@ import time
 from pathlib import Path
 
 from fabfold.errors import FabfoldError
-from fabfold.fold.certify import certify
 from fabfold.joinery.build import build_bodies
+from fabfold.proof.certify import certify
 from fabfold.tree.catalogue import double_joints, edge_sides
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))

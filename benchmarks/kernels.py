@@ -57,7 +57,7 @@ def do_solve(seed: int) -> str:
     from dataclasses import asdict
 
     from fabfold.errors import NoFoldError
-    from fabfold.fold.foldability import LatticeFoldability
+    from fabfold.fold.lattice_foldability import LatticeFoldability
     from fabfold.tree.effort import Effort
     from fabfold.tree.solve import Statistics, solve
 
@@ -92,13 +92,13 @@ def strip_system() -> Any:
 
 
 def do_closure(_seed: int) -> str:
-    from fabfold.fold.lattice import stuck_hinges
+    from fabfold.fold.lattice_paths import stuck_hinges
 
     return digest(stuck_hinges(strip_system()))
 
 
 def do_plan(_seed: int) -> str:
-    from fabfold.fold.lattice import find_path
+    from fabfold.fold.lattice_paths import find_path
 
     found = find_path(strip_system(), 300, 60)
     path = np.zeros(0) if found.path is None else found.path
@@ -109,8 +109,8 @@ def do_certify(_seed: int) -> str:
     """The swept proof of a barrel in its sleeve."""
     import manifold3d
 
-    from fabfold.fold.bvh import empty_boxes, refit
-    from fabfold.fold.gap import least_gap
+    from fabfold.proof.bvh import empty_boxes, refit
+    from fabfold.proof.gap import least_gap
 
     cylinder = manifold3d.Manifold.cylinder
     sleeve = cylinder(6.0, 5.0, 5.0, 24, True) - cylinder(9.0, 2.8, 2.8, 24, True)

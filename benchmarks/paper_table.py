@@ -60,7 +60,7 @@ class StageTimes:
 def run_one(source: str, template: str, kit_folder: Path) -> dict[str, Any]:
     """Make one kit in this process and return its row."""
     from fabfold.errors import FabfoldError
-    from fabfold.kit import Kit
+    from fabfold.kit.kit import Kit
 
     times = StageTimes()
     row: dict[str, Any] = {"template": template}
@@ -146,7 +146,7 @@ def main() -> None:
         print(json.dumps(run_one(source, template, Path(kit))))
         return
 
-    from fabfold.solid.samples import sample, sample_names
+    from fabfold.samples.catalogue import sample, sample_names
 
     jobs = {n: (str(options.models / m[0]), m[1]) for n, m in MODELS.items()}
     jobs |= {f"sample:{n}": (f"sample:{n}", sample(n).template) for n in sample_names()}

@@ -33,15 +33,15 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
     Of the voxelizations that seeds take in turn, the first one of which a tree folds is polished.
     """
     from fabfold.errors import NoFoldError, NoTreeError
-    from fabfold.fold.foldability import LatticeFoldability
-    from fabfold.lattice import load_template
-    from fabfold.rounds import search_order
-    from fabfold.solid.load import load_solid
+    from fabfold.fold.lattice_foldability import LatticeFoldability
+    from fabfold.lattice.shipped import load_template
+    from fabfold.samples.catalogue import load_model
+    from fabfold.search.rounds import search_order
     from fabfold.tree.effort import Effort
     from fabfold.tree.problem import from_features
     from fabfold.tree.solve import Statistics, solve
     from fabfold.voxels.features import features
-    from fabfold.voxels.search import voxelize
+    from fabfold.voxels.voxelize import voxelize
 
     target = load_template(template)
     found: list[Any] = []
@@ -55,7 +55,7 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
                 found.append((system, guide))
             return super().outlook(system, expansions, guide)
 
-    for voxels in search_order(voxelize(load_solid(model), target, seed=1)):
+    for voxels in search_order(voxelize(load_model(model), target, seed=1)):
         with suppress(NoFoldError, NoTreeError):
             solve(
                 from_features(voxels, features(voxels), target),
@@ -73,7 +73,7 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
 
 def measure(systems: list[Any]) -> list[dict[str, Any]]:
     """Found paths and CPU milliseconds of each variant, the same systems in the same order."""
-    from fabfold.fold.lattice import find_path
+    from fabfold.fold.lattice_paths import find_path
 
     rows = []
     for name, looks in VARIANTS:

@@ -130,7 +130,7 @@ def side_by_side(commands: Sequence[Sequence[str]], workers: int, names: Sequenc
 
 def voxelized(model: Model, folder: Path, **options: Any) -> Any:
     """Kit of a model, with its voxelizations made once and kept in `folder`."""
-    from fabfold.kit import Kit
+    from fabfold.kit.kit import Kit
 
     kit = Kit.from_model(
         model.source, template=model.template, folder=folder, workers=1, seed=1, **options
@@ -154,7 +154,7 @@ def recipe_of(kit: Any, seed: int, joints: str | None) -> Any:
 def rounds_of(kit: Any, recipe: Any, options: Sequence[Any] | None = None) -> Any:
     """Rounds of seeds over the kit's voxelizations, or over some of them, for another recipe."""
     from fabfold.progress import SilentListener
-    from fabfold.rounds import Rounds
+    from fabfold.search.rounds import Rounds
     from fabfold.store import StageStore
 
     return Rounds(
@@ -170,8 +170,8 @@ def rounds_of(kit: Any, recipe: Any, options: Sequence[Any] | None = None) -> An
 
 def warm_up(job: Any, joints: Any) -> float:
     """Compile all kernels, or load them from the cache; CPU seconds."""
-    from fabfold.seeds import run_seed
-    from fabfold.warming import strip_job
+    from fabfold.search.seeds import run_seed
+    from fabfold.search.warmup import strip_job
 
     start = time.process_time()
     run_seed(strip_job(joints), 1, lambda _: None, lambda: False)
@@ -282,7 +282,7 @@ def timed_run(
         Changes each job, for the ablation.
     """
     from fabfold.errors import FabfoldError
-    from fabfold.seeds import Job, run_seed
+    from fabfold.search.seeds import Job, run_seed
 
     facts: dict[str, Any] = {"seed": seed, "joints": joints, "seconds": seconds}
     try:
@@ -363,13 +363,13 @@ def _prove(
 ) -> dict[str, Any]:
     import numpy as np
 
-    from fabfold.attempt import Attempt
     from fabfold.errors import CheckError, GeometryError
     from fabfold.fold.motion import motion_of
-    from fabfold.fold.sampled import sample_path
+    from fabfold.kit.stages import Attempt
     from fabfold.progress import SilentProgress
-    from fabfold.tree.check import check_tree
-    from fabfold.tree.model import FoldTree
+    from fabfold.proof.sampled import sample_path
+    from fabfold.tree.fold_tree import FoldTree
+    from fabfold.tree.kinematics_check import check_tree
 
     entry = run["trees"][number]
     tree = FoldTree.from_json(entry["tree"])

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fabfold.tree.solve import Candidate
-    from fabfold.voxels.model import Voxels
+    from fabfold.voxels.voxel_model import Voxels
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ def pairs(candidate: Candidate) -> int:
 def searched(voxels: Voxels, template: str, share: bool, seeds: int) -> list[Run]:
     """A short search with each seed."""
     from fabfold.errors import NoSolutionError
-    from fabfold.fold.foldability import LatticeFoldability
-    from fabfold.lattice import load_template
+    from fabfold.fold.lattice_foldability import LatticeFoldability
+    from fabfold.lattice.shipped import load_template
     from fabfold.tree.effort import Effort
     from fabfold.tree.problem import from_features
     from fabfold.tree.solve import solve
@@ -59,9 +59,9 @@ def searched(voxels: Voxels, template: str, share: bool, seeds: int) -> list[Run
 
 def proven(voxels: Voxels, candidate: Candidate) -> str:
     """The certified gap of the bodies of a tree, or why there is none."""
-    from fabfold.attempt import Attempt, build
     from fabfold.errors import FabfoldError
     from fabfold.fold.motion import motion_of
+    from fabfold.kit.stages import Attempt, build
     from fabfold.printing.profiles import load_profile
     from fabfold.progress import SilentProgress
 
@@ -75,7 +75,7 @@ def proven(voxels: Voxels, candidate: Candidate) -> str:
 
 
 def main() -> None:
-    from fabfold.voxels.store import load_voxels
+    from fabfold.voxels.voxel_files import load_voxels
 
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter

@@ -14,10 +14,11 @@ from typing import Any
 from fabfold.export.picture import png_bytes
 from fabfold.export.sketch import picture_of_tree
 from fabfold.files import write_bytes
-from fabfold.kit import Kit
-from fabfold.lattice import FACES
-from fabfold.tree.wishes import Keep, Wishes
-from fabfold.voxels.regions import area_of, owners, parse_shape, region_of
+from fabfold.kit.kit import Kit
+from fabfold.lattice.rotations import FACES
+from fabfold.solid.regions import area_of, parse_shape, region_of
+from fabfold.voxels.region_cells import owners
+from fabfold.wishes.terms import Keep, Wishes
 
 #: Axles and tracks of the sample's wheels.
 WHEELS = tuple(f"sphere({x},{y},9.8,10)" for x in (-21.5, 21.5) for y in (-13.3, 13.3))

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.creases import folded_template, parts_of
 from fabfold.export.colours import palette
 from fabfold.export.picture import picture_of_kit
 from fabfold.export.render import Image, Mesh, View, png_bytes, render
 from fabfold.files import write_bytes
-from fabfold.lattice import Template, load_template
+from fabfold.lattice.creases import folded_template, parts_of
+from fabfold.lattice.shipped import load_template
+from fabfold.lattice.template import Template
 
 HOME = Path(__file__).parent / "pictures"
 VIEW = View(azimuth_deg=-60.0, elevation_deg=30.0, size=(340, 300), lights=30)
@@ -79,7 +80,7 @@ def templates() -> None:
 
 def kit() -> None:
     """A printed object as model, as flat template, and as box."""
-    from fabfold.kit import Kit
+    from fabfold.kit.kit import Kit
 
     made = Kit.from_model("sample:car", template="map-48", seed=1, effort="quick").join()
     tree, motion = made.attempt.tree, made.attempt.motion

@@ -1,5 +1,5 @@
 """``python -m fabfold`` is the command ``fabfold``."""
 
-from fabfold.cli import main
+from fabfold.cli.app import main
 
 main()

@@ -6,9 +6,9 @@ import numpy as np
 from joinery_models import voxels_of
 from numpy.typing import NDArray
 
-from fabfold.lattice import Template
-from fabfold.tree.model import Body, Edge, FoldTree, Hinge
-from fabfold.voxels.model import Voxels
+from fabfold.lattice.template import Template
+from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
+from fabfold.voxels.voxel_model import Voxels
 
 Cell = tuple[int, int, int]
 

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fabfold.fold.model import Motion
-from fabfold.lattice import FACES, Template
+from fabfold.fold.motion import Motion
+from fabfold.lattice.rotations import FACES
+from fabfold.lattice.template import Template
 from fabfold.tree.catalogue import edge_sides
-from fabfold.tree.model import Body, Edge, FoldTree, Hinge
+from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
 
 #: Kind, sides (0 to 3, see `edge_sides`) and quarter turns of a joint.
 JointSpec = tuple[str, tuple[int, ...], tuple[int, ...]]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import manifold3d as m3
 import numpy as np
 
-from fabfold.fold.model import Motion
-from fabfold.joinery.model import BodyMesh, Joinery
-from fabfold.lattice import Template
-from fabfold.tree.model import Body, Edge, FoldTree, Hinge
+from fabfold.fold.motion import Motion
+from fabfold.joinery.bodies import BodyMesh, Joinery
+from fabfold.lattice.template import Template
+from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
 
 VOXEL_MM = 20.0
 ORIGIN_MM = (12.5, -7.0, 10.0)

@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.fold.model import Motion
-from fabfold.lattice import Template
-from fabfold.tree.model import Body, Edge, FoldTree, Hinge
-from fabfold.voxels.model import SUBDIVISION, Voxels
+from fabfold.fold.motion import Motion
+from fabfold.lattice.template import Template
+from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
+from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 
 
 def box_mesh(

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.seeds import Done, Job, run_seed
+from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.search.seeds import Done, Job, run_seed
 
 
 class Results:

@@ -1,7 +1,7 @@
 import pytest
 from typer.testing import CliRunner
 
-from fabfold.cli import app
+from fabfold.cli.app import app
 from fabfold.errors import RecipeError
 from fabfold.printing.calibrate import calibrate, write_profile
 from fabfold.printing.profiles import load_profile

@@ -31,7 +31,7 @@ def fabfold(*arguments, cwd=None):
 def test_help_imports_no_cad_package():
     code = (
         "import sys\n"
-        "from fabfold.cli import main\n"
+        "from fabfold.cli.app import main\n"
         "try:\n    main(['--help'])\n"
         "except SystemExit as stop:\n    assert not stop.code\n"
         f"loaded = sorted(set(sys.modules) & set({HEAVY!r}))\n"

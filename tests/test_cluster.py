@@ -15,9 +15,9 @@ from judges import Announcing, Poisoned, Results, first_question
 from tree_cases import solid_problem, strip
 
 from fabfold.errors import RecipeError, WorkerError
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.search import executor, run_seeds, search
-from fabfold.seeds import Job
+from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.search.run import executor, run_seeds, search
+from fabfold.search.seeds import Job
 from fabfold.tree.effort import EFFORTS
 
 pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
@@ -87,8 +87,8 @@ class Dask:
 
 @pytest.fixture(autouse=True)
 def _patient(monkeypatch):
-    monkeypatch.setattr("fabfold.cluster.FIRST", LONG)
-    monkeypatch.setattr("fabfold.cluster.PATIENCE", LONG)
+    monkeypatch.setattr("fabfold.search.dask.FIRST", LONG)
+    monkeypatch.setattr("fabfold.search.dask.PATIENCE", LONG)
 
 
 @pytest.fixture(scope="module")
@@ -216,21 +216,21 @@ def test_without_workers_or_with_foreign_ones_it_is_said(problem, tmp_path, monk
         search(problem, [0], LatticeFoldability(), EFFORT, scheduler=made.address)
 
     try:
-        monkeypatch.setattr("fabfold.cluster.FIRST", 1.0)
+        monkeypatch.setattr("fabfold.search.dask.FIRST", 1.0)
         with pytest.raises(RecipeError, match=r"no workers; start some with 'dask worker"):
             run()
-        monkeypatch.setattr("fabfold.cluster.FIRST", LONG)
+        monkeypatch.setattr("fabfold.search.dask.FIRST", LONG)
         foreign = made.worker(without_fabfold=True)
         with pytest.raises(RecipeError, match="cannot import fabfold"):
             run()
         end([foreign])
         made.worker()
         with monkeypatch.context() as patch:
-            patch.setattr("fabfold.cluster.__version__", "99.0")
+            patch.setattr("fabfold.search.dask.__version__", "99.0")
             with pytest.raises(RecipeError, match=r"has fabfold \d.*install fabfold 99\.0"):
                 run()
         end([made.scheduler])
-        monkeypatch.setattr("fabfold.cluster.CONNECT", 2.0)
+        monkeypatch.setattr("fabfold.search.dask.CONNECT", 2.0)
         with pytest.raises(RecipeError, match="no Dask scheduler answers"):
             run()
     finally:
@@ -238,7 +238,7 @@ def test_without_workers_or_with_foreign_ones_it_is_said(problem, tmp_path, monk
 
 
 def test_a_scheduler_that_goes_away_is_told(problem, tmp_path, monkeypatch):
-    monkeypatch.setattr("fabfold.cluster.CONNECT", 5.0)
+    monkeypatch.setattr("fabfold.search.dask.CONNECT", 5.0)
     made = Dask(tmp_path)
     try:
         made.worker()
@@ -262,7 +262,7 @@ def test_an_address_that_is_none_is_refused(problem, address):
 
 
 def test_a_port_where_nobody_answers_is_refused(problem, monkeypatch):
-    monkeypatch.setattr("fabfold.cluster.CONNECT", 1.0)
+    monkeypatch.setattr("fabfold.search.dask.CONNECT", 1.0)
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"

@@ -25,7 +25,7 @@ from fabfold.export.shading import corner_normals, split_vertices
 from fabfold.export.stl import write_combined_stl, write_stl
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.export.weld import is_closed, printable_mesh, weld
-from fabfold.joinery.model import BodyMesh
+from fabfold.joinery.bodies import BodyMesh
 
 
 @pytest.fixture(scope="module")

@@ -25,8 +25,8 @@ from fabfold.export.picture import (
     strip,
     write_strip,
 )
-from fabfold.fold.model import Motion
-from fabfold.solid.model import Solid
+from fabfold.fold.motion import Motion
+from fabfold.solid.closed_solid import Solid
 
 SMALL = View(size=(120, 90), samples=1, lights=6)
 

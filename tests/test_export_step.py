@@ -14,13 +14,13 @@ import pytest
 from export_kits import BARREL_MM, CLEARANCE_MM, row_joinery, row_tree
 
 from fabfold.errors import GeometryError
-from fabfold.export.brep import brep_of
-from fabfold.export.regions import Axis, Plane, Round, flat_regions, round_regions
+from fabfold.export.body_brep import brep_of
 from fabfold.export.step import write_step
 from fabfold.export.steptext import _string
+from fabfold.export.surfaces import Axis, Plane, Round, flat_regions, round_regions
 from fabfold.export.thin import thinned
 from fabfold.export.weld import is_closed
-from fabfold.joinery.model import BodyMesh, Joinery
+from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.meshes import mesh_volume
 
 

@@ -16,13 +16,13 @@ from carving_models import (
 )
 from test_fold_lattice import random_system
 
-from fabfold.fold.carving import Carving, carved_path, plan_carving
+from fabfold.fold.carving_plan import Carving, carved_path, plan_carving
+from fabfold.fold.clashes import meetings_on
 from fabfold.fold.cores import CORE, core_table
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.fold.interlock import meetings_on
-from fabfold.fold.lattice import closure, find_path, free_moves
+from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.fold.lattice_paths import closure, find_path, free_moves
 from fabfold.fold.reference import TOUCH, turn_overlap
-from fabfold.fold.sweep import sweep_table
+from fabfold.lattice.sweep import sweep_table
 from fabfold.tree.system import hinge_system
 
 ROUND = 1.0 - np.pi / 4
@@ -135,11 +135,13 @@ def test_a_cell_that_gives_way_alone_is_rounded(slot, lid):
 @pytest.mark.parametrize(("gives", "volume"), [((1, 0, 0), ROUND), ((2, 0, 0), np.pi / 4 - 0.5)])
 def test_volume_of_a_one_sided_cut_is_the_analytic_one(slot, gives, volume, monkeypatch):
     # No way to share: between the two sides only.
-    monkeypatch.setattr("fabfold.fold.carving._SPLITS", 0)
+    monkeypatch.setattr("fabfold.fold.carving_plan._SPLITS", 0)
     tree, system, path = slot
     material = full_material(tree)
     other = voxel(tree, (2, 0, 0) if gives == (1, 0, 0) else (1, 0, 0))
-    monkeypatch.setattr("fabfold.fold.carving.skin_of", lambda cells, given: only(given, other))
+    monkeypatch.setattr(
+        "fabfold.fold.carving_plan.skin_of", lambda cells, given: only(given, other)
+    )
     carving = plan_carving(system, path, material)
     assert carving.lost[voxel(tree, gives)] == pytest.approx(volume, abs=0.015)
     assert carving.lost[other] == 0.0

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from fabfold.errors import CheckError
-from fabfold.fold.bvh import empty_boxes, refit
-from fabfold.fold.certify import certify
-from fabfold.fold.gap import DONE, FAILED, least_gap, triangle_distance
-from fabfold.fold.model import Motion
+from fabfold.fold.motion import Motion
+from fabfold.proof.bvh import empty_boxes, refit
+from fabfold.proof.certify import certify
+from fabfold.proof.gap import DONE, FAILED, least_gap, triangle_distance
 
 VOXEL = 10.0
 ORIGIN = (3.0, -2.0, 7.0)

@@ -8,8 +8,8 @@ from collections import deque
 import numpy as np
 import pytest
 
-from fabfold.fold.foldability import LatticeFoldability, octants_of
-from fabfold.fold.lattice import _ready, closure, find_path, free_moves, refined
+from fabfold.fold.lattice_foldability import LatticeFoldability, octants_of
+from fabfold.fold.lattice_paths import _ready, closure, find_path, free_moves, refined
 from fabfold.fold.mechanism import pose_scene
 from fabfold.fold.reference import (
     TOUCH,
@@ -22,9 +22,9 @@ from fabfold.fold.reference import (
     stuck,
     turn_overlap,
 )
-from fabfold.fold.sweep import sweep_table
 from fabfold.fold.turns import obstacles, workspace
-from fabfold.lattice import FACES
+from fabfold.lattice.rotations import FACES
+from fabfold.lattice.sweep import sweep_table
 from fabfold.tree.system import HingeSystem
 
 JUDGE = LatticeFoldability()

@@ -8,10 +8,9 @@ import joinery_models
 import numpy as np
 import pytest
 
-from fabfold.fold.model import Motion
-from fabfold.fold.motion import motion_of
-from fabfold.fold.replay import material_boxes, replay
-from fabfold.tree.model import Hinge
+from fabfold.fold.motion import Motion, motion_of
+from fabfold.proof.replay import material_boxes, replay
+from fabfold.tree.fold_tree import Hinge
 
 ORIGIN = (1.0, 2.0, 3.0)
 

@@ -6,8 +6,8 @@ import joinery_models
 import numpy as np
 import pytest
 
-from fabfold.fold.certify import certify
-from fabfold.fold.sampled import sample_path
+from fabfold.proof.certify import certify
+from fabfold.proof.sampled import sample_path
 
 VOXEL = 10.0
 ORIGIN = (3.0, -2.0, 7.0)

@@ -19,12 +19,12 @@ from joinery_models import (
 )
 
 from fabfold.errors import GeometryError, RecipeError
-from fabfold.fold.model import Motion
+from fabfold.fold.motion import Motion
 from fabfold.joinery.build import build_bodies
+from fabfold.joinery.one_piece import CRUMB_SHARE
 from fabfold.joinery.sizes import hinge_size, smallest_voxel
-from fabfold.joinery.unite import CRUMB_SHARE
-from fabfold.lattice import Template
-from fabfold.tree.model import Body, Edge, FoldTree, Hinge
+from fabfold.lattice.template import Template
+from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
 
 VOXEL = 20.0
 CLEARANCE = 0.3

@@ -10,16 +10,16 @@ from carving_models import LID, LID_HINGES, SLOT, SLOT_HINGES, full_voxels, tree
 from joinery_models import motion_of_order, posed
 
 from fabfold.errors import CheckError, GeometryError
-from fabfold.fold.carving import plan_carving
-from fabfold.fold.certify import certify
+from fabfold.fold.carving_plan import plan_carving
 from fabfold.fold.motion import quarter_path
-from fabfold.fold.replay import replay
-from fabfold.fold.sampled import sample_path
 from fabfold.joinery import build
 from fabfold.joinery.build import build_bodies
 from fabfold.joinery.carving import Carved
-from fabfold.joinery.placement import knuckle_zone
+from fabfold.joinery.hinge_placement import knuckle_zone
 from fabfold.joinery.sizes import hinge_size
+from fabfold.proof.certify import certify
+from fabfold.proof.replay import replay
+from fabfold.proof.sampled import sample_path
 from fabfold.tree.system import hinge_system
 
 VOXEL, CLEARANCE = 20.0, 0.3

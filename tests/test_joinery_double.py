@@ -9,25 +9,25 @@ import pytest
 from double_models import RIGID, full_solid, hand_tree, motion_of, planned
 from joinery_models import posed, voxels_of
 
-from fabfold.attempt import Attempt, Made
-from fabfold.checking import run_checks
 from fabfold.errors import GeometryError
-from fabfold.fold.certify import certify
 from fabfold.joinery.build import build_bodies
 from fabfold.joinery.cutting import Cut
 from fabfold.joinery.grooves import Passage
+from fabfold.joinery.hinge_placement import double_layout, fittings, hinge_frames
 from fabfold.joinery.links import link_body
-from fabfold.joinery.placement import double_layout, fittings, hinge_frames
-from fabfold.joinery.plates import grown_corners
+from fabfold.joinery.one_piece import MendTally
+from fabfold.joinery.pockets import grown_corners
 from fabfold.joinery.sizes import hinge_size, smallest_voxel
-from fabfold.joinery.unite import Tally
+from fabfold.kit.checking import run_checks
+from fabfold.kit.stages import Attempt, Made
+from fabfold.kit.writing import write_kit
 from fabfold.printing.profiles import load_profile
 from fabfold.progress import SilentProgress
-from fabfold.recipe import Recipe
-from fabfold.solid.model import Solid
+from fabfold.proof.certify import certify
+from fabfold.recipe.recipe import Recipe
+from fabfold.solid.closed_solid import Solid
 from fabfold.tree.catalogue import double_joints
-from fabfold.tree.check import check_tree
-from fabfold.writing import write_kit
+from fabfold.tree.kinematics_check import check_tree
 from hinges.errors import FitError
 
 VOXEL, CLEARANCE = 20.0, 0.3
@@ -230,7 +230,7 @@ def test_two_plates_in_one_face_are_refused():
     way = Passage(1, 2, corners, np.zeros(3), np.zeros(3), 0.0)
     cut = Cut(1, tree, replace(fitted, plates={1: plate, 2: other}), [], [way], size, VOXEL)
     with pytest.raises(GeometryError, match=r"link-00: .* cut it apart"):
-        link_body(cut, Tally())
+        link_body(cut, MendTally())
 
 
 @pytest.mark.parametrize(("across", "fate"), [(True, "cut"), (False, "kept")])
@@ -246,7 +246,7 @@ def test_a_barrel_may_groove_a_link_but_not_cut_it(across, fate):
     ends = [[0.5, 0.0, -0.5], [0.5, 0.0, 0.5]] if across else [[0.5, -0.5, 0.4], [0.5, 0.5, 0.4]]
     way = Passage(1, 2, np.array(ends), np.zeros(3), np.zeros(3), 0.0)
     cut = Cut(1, tree, fitted, [way], [], size, VOXEL)
-    tally = Tally()
+    tally = MendTally()
     if fate == "cut":
         with pytest.raises(GeometryError, match="link-00: hinge-02 cut it apart"):
             link_body(cut, tally)

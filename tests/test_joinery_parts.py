@@ -11,12 +11,12 @@ from joinery_models import corner_tree, motion_of_order, strip_tree
 
 from fabfold.errors import GeometryError
 from fabfold.fold.barrels import encounter_on_lattice, first_encounter, segment_distance
-from fabfold.fold.model import Motion
+from fabfold.fold.motion import Motion
 from fabfold.joinery.cells import as_manifold, eroded_cells, occupancy
 from fabfold.joinery.grooves import Passage, descendants, groove_tools, passages
-from fabfold.joinery.placement import hinge_frames
+from fabfold.joinery.hinge_placement import hinge_frames
 from fabfold.joinery.soundness import finish_mesh, mesh_faults, piece_count, stl_mesh
-from fabfold.lattice import rotation_about
+from fabfold.lattice.rotations import rotation_about
 from fabfold.tree.system import hinge_system
 
 CELLS = {

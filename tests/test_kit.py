@@ -12,9 +12,9 @@ import pytest
 import trimesh
 
 from fabfold.errors import KitError, ModelError, NoSolutionError, RecipeError
-from fabfold.fold.model import Motion
-from fabfold.kit import Kit, open_kit
-from fabfold.tree.model import FoldTree
+from fabfold.fold.motion import Motion
+from fabfold.kit.kit import Kit, open_kit
+from fabfold.tree.fold_tree import FoldTree
 
 #: A shell's background job ignores SIGINT, and so do its children; both signals stop a run alike.
 HEARS_CTRL_C = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN

@@ -2,18 +2,17 @@ import numpy as np
 import pytest
 
 from fabfold.errors import TemplateError
-from fabfold.lattice import (
+from fabfold.lattice.rotations import (
     FACES,
     ROTATION_INVERSE,
     ROTATION_PRODUCT,
     ROTATIONS,
-    Template,
-    load_template,
     parity,
     rotation_about,
     rotation_index,
-    template_names,
 )
+from fabfold.lattice.shipped import load_template, template_names
+from fabfold.lattice.template import Template
 
 
 def test_rotations_are_the_rotation_group_of_the_cube():

@@ -10,9 +10,9 @@ import pytest
 import trimesh
 
 from fabfold.errors import RecipeError
-from fabfold.kit import Kit, open_kit
-from fabfold.pareto import Solution, undominated
-from fabfold.tree.check import check_tree
+from fabfold.kit.kit import Kit, open_kit
+from fabfold.search.pareto import Solution, undominated
+from fabfold.tree.kinematics_check import check_tree
 
 
 def solution(joints, surface, kept=None):

@@ -10,8 +10,8 @@ import pytest
 from joinery_models import box_mesh, box_strip, motion_of_order, strip_tree, voxels_of
 
 from fabfold.errors import RecipeError
+from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.joinery.build import build_bodies
-from fabfold.joinery.model import BodyMesh, Joinery
 from fabfold.joinery.sizes import hinge_size
 from fabfold.printing.checks import check_bodies, smallest_gap
 from fabfold.printing.profiles import DEFAULT_PROFILE, Profile, load_profile, profile_names

@@ -1,7 +1,7 @@
 import pytest
 
 from fabfold.errors import RecipeError, TemplateError
-from fabfold.recipe import make_recipe, read_recipe
+from fabfold.recipe.recipe import make_recipe, read_recipe
 
 
 def test_a_recipe_survives_its_file(tmp_path):

@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 from fabfold.errors import NoFoldError
-from fabfold.kit import Kit, open_kit
-from fabfold.search import Budget
-from fabfold.tree.check import check_tree
+from fabfold.kit.kit import Kit, open_kit
+from fabfold.search.run import Budget
+from fabfold.tree.kinematics_check import check_tree
 
 OPTIONS = {"template": "box-2x2x2", "effort": "quick", "seed": 3}
 
@@ -99,7 +99,7 @@ def test_a_budget_goes_through_rounds_and_the_best_of_all_wins(whole, bar, tmp_p
         def restart(self):
             type(self).looks = 0
 
-    monkeypatch.setattr("fabfold.rounds.Budget", Counting)
+    monkeypatch.setattr("fabfold.search.rounds.Budget", Counting)
     kit = Kit.from_model(bar, folder=tmp_path / "timed", workers=1, seconds=30, **OPTIONS)
     found = kit.fit()
     kept = content(kit)
@@ -125,7 +125,7 @@ def test_more_time_goes_on_and_the_same_time_does_not_repeat(whole, monkeypatch,
     def run_seeds(_pool, tasks, _hear, _over):
         ran.extend(seed for (seed, _), _ in zip(tasks, range(6), strict=False))
 
-    monkeypatch.setattr("fabfold.rounds.run_seeds", run_seeds)
+    monkeypatch.setattr("fabfold.search.rounds.run_seeds", run_seeds)
     before = content(whole)
     more = open_kit(str(whole.folder), workers=1, seconds=60)
     best = more.fit()[0]

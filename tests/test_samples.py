@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from fabfold.errors import ModelError
-from fabfold.lattice import load_template
-from fabfold.solid.load import load_solid
-from fabfold.solid.model import Solid
-from fabfold.solid.samples import build_sample, sample, sample_names, solid_of
-from fabfold.voxels.scan import occupancy
+from fabfold.lattice.shipped import load_template
+from fabfold.samples.catalogue import build_sample, load_model, sample, sample_names, solid_of
+from fabfold.solid.closed_solid import Solid
+from fabfold.solid.scan import occupancy
 
 
 @functools.cache
@@ -30,7 +29,7 @@ def test_names() -> None:
     assert {"car", "elephant", "rabbit"} <= set(sample_names())
     assert sample_names() == sorted(sample_names())
     with pytest.raises(ModelError, match=r"no sample 'unicorn'.*rabbit"):
-        load_solid("sample:unicorn")
+        load_model("sample:unicorn")
 
 
 def test_templates_of_the_classics() -> None:
@@ -92,7 +91,7 @@ def test_is_chunky_enough_for_its_box(name: str) -> None:
 
 
 def test_same_bytes_every_time() -> None:
-    first, second = loaded("duck"), load_solid("sample:duck")
+    first, second = loaded("duck"), load_model("sample:duck")
     assert first.vertices.tobytes() == second.vertices.tobytes()
     assert first.faces.tobytes() == second.faces.tobytes()
     assert first.sha256 == second.sha256

@@ -13,11 +13,11 @@ from judges import Deadly, Deaf, Poisoned, Results, first_question
 from tree_cases import solid_problem, strip
 
 from fabfold.errors import NoTreeError, RecipeError, WorkerError
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.search import executor, run_seeds, search
-from fabfold.seeds import Job, SeedResult
-from fabfold.tree.check import check_tree
+from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.search.run import executor, run_seeds, search
+from fabfold.search.seeds import Job, SeedResult
 from fabfold.tree.effort import EFFORTS
+from fabfold.tree.kinematics_check import check_tree
 
 EFFORT = replace(EFFORTS["quick"], restarts=2, polishing=20)
 
@@ -131,7 +131,7 @@ def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, workers)
 
 
 def test_a_worker_that_does_not_hear_is_ended_and_its_last_word_counts(problem, monkeypatch):
-    monkeypatch.setattr("fabfold.search.GRACE", 0.2)
+    monkeypatch.setattr("fabfold.search.run.GRACE", 0.2)
     heard = Results()
     job = Job(problem, Deaf(), EFFORT)
 

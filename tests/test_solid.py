@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from fabfold.errors import ModelError
+from fabfold.solid.closed_solid import Solid
 from fabfold.solid.load import load_solid, solid_from_mesh
-from fabfold.solid.model import Solid
 from fabfold.solid.raw import RawMesh
 
 MODELS = Path(__file__).parents[2] / "shared" / "models"
@@ -449,7 +449,7 @@ def test_what_is_no_solid_is_refused(parts: list[np.ndarray], words: str) -> Non
 
 
 def test_turned_plate_is_refused() -> None:
-    from fabfold.lattice import rotation_about
+    from fabfold.lattice.rotations import rotation_about
 
     turn = rotation_about(np.zeros(3), np.array([1, 2, 3]), 40.0)[:3, :3]
     with pytest.raises(ModelError, match="too thin"):

@@ -6,25 +6,26 @@ import numpy as np
 import pytest
 from tree_cases import solid_problem, strip
 
-from fabfold.creases import folded_template, parts_of
 from fabfold.errors import ModelError, NoTreeError, RecipeError, TemplateError
 from fabfold.export.flat import flat_poses
 from fabfold.fold.closing import closed
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.fold.lattice import free_moves
+from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.fold.lattice_paths import free_moves
 from fabfold.fold.motion import end_pose_error, motion_of
-from fabfold.joinery.model import Joinery
-from fabfold.lattice import ROTATIONS, load_template, template_names
-from fabfold.solid.model import Solid
-from fabfold.targets import find_input, load_target, named_target
-from fabfold.tree.build import hinge_choice
-from fabfold.tree.check import check_tree
+from fabfold.joinery.bodies import Joinery
+from fabfold.lattice.creases import folded_template, parts_of
+from fabfold.lattice.rotations import ROTATIONS
+from fabfold.lattice.shipped import load_template, template_names
+from fabfold.recipe.targets import find_input, load_target, named_target
+from fabfold.solid.closed_solid import Solid
+from fabfold.tree.assembly import hinge_choice
 from fabfold.tree.effort import Effort
+from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.parts import parted
 from fabfold.tree.solve import solve
 from fabfold.tree.starts import grow
 from fabfold.tree.system import HingeSystem, hinge_system
-from fabfold.voxels.target import template_of_solid
+from fabfold.voxels.mesh_template import template_of_solid
 
 BOOK = """
 name = "book"
@@ -259,7 +260,7 @@ def test_a_number_of_cells_needs_a_mesh(tmp_path):
 
 @pytest.mark.parametrize("kind", ["toml", "stl"])
 def test_a_kit_makes_itself_again_without_the_files_it_came_from(tmp_path, kind):
-    from fabfold.kit import open_kit
+    from fabfold.kit.kit import open_kit
 
     solid = blocks(((0, 0, 0), (4, 2, 2)))
     model = write_stl(tmp_path / "bar.stl", solid)

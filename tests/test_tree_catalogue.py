@@ -3,14 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fabfold.lattice import FACES, ROTATIONS, parity
-from fabfold.tree.catalogue import (
-    double_joints,
-    edge_sides,
-    face_transforms,
-    single_joints,
-    turn,
-)
+from fabfold.lattice.rotations import FACES, ROTATIONS, parity
+from fabfold.tree.catalogue import double_joints, edge_sides, face_transforms, single_joints, turn
 
 
 @pytest.mark.parametrize("face", range(6))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from tree_cases import solid_problem, strip
 
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.tree.check import check_tree
+from fabfold.fold.lattice_foldability import LatticeFoldability
 from fabfold.tree.effort import Effort
-from fabfold.tree.model import Body, Edge, FoldTree
+from fabfold.tree.fold_tree import Body, Edge, FoldTree
+from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.solve import solve
 
 QUICK = Effort(polishing=50, restarts=10)

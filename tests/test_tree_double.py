@@ -10,22 +10,23 @@ import pytest
 from tree_cases import face_pairs, strip
 
 from fabfold.errors import NoTreeError
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.fold.lattice import find_path, free_moves
+from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.fold.lattice_paths import find_path, free_moves
 from fabfold.fold.reference import TOUCH, path_overlap
-from fabfold.lattice import FACES, ROTATIONS, load_template, parity
-from fabfold.tree.build import fold_tree, hinge_choice
+from fabfold.lattice.rotations import FACES, ROTATIONS, parity
+from fabfold.lattice.shipped import load_template
+from fabfold.tree.assembly import fold_tree, hinge_choice
 from fabfold.tree.catalogue import edge_sides, face_transforms, joint_rows, turn, ways
-from fabfold.tree.check import check_tree
 from fabfold.tree.effort import Effort
+from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.grow import doubles_needed
-from fabfold.tree.model import FoldTree
+from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.problem import tree_problem
 from fabfold.tree.rng import generator
 from fabfold.tree.solve import solve
 from fabfold.tree.starts import grow
+from fabfold.tree.swept_cells import double_blocked, hinge_tables
 from fabfold.tree.system import HingeSystem, hinge_system
-from fabfold.tree.wedge import double_blocked, hinge_tables
 
 QUICK = Effort(polishing=20, restarts=10)
 

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 from tree_cases import animal, face_pairs, solid_problem, strip
 
-from fabfold.lattice import FACES, ROTATIONS, load_template, parity
-from fabfold.tree.build import hinge_choice
+from fabfold.lattice.rotations import FACES, ROTATIONS, parity
+from fabfold.lattice.shipped import load_template
+from fabfold.tree.assembly import hinge_choice
 from fabfold.tree.grow import clusters, energy_of
 from fabfold.tree.problem import joint_table, tree_problem
 from fabfold.tree.rebuild import apart
 from fabfold.tree.rng import generator, random_below, random_bits, random_float
 from fabfold.tree.ruin import propose
 from fabfold.tree.starts import grow
-from fabfold.tree.wedge import half_turn_table, hinge_tables
+from fabfold.tree.swept_cells import half_turn_table, hinge_tables
 
 CASES = [(30, "box-3x3x4", 1), (45, "box-3x4x4", 2), (62, "box-4x4x4", 3)]
 

@@ -13,29 +13,24 @@ from joinery_models import posed, voxels_of
 from tree_cases import face_pairs, solid_problem, strip
 
 from fabfold.errors import NoTreeError
-from fabfold.fold.certify import certify
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.fold.lattice import free_moves
+from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.fold.lattice_paths import free_moves
 from fabfold.fold.motion import motion_of
-from fabfold.fold.replay import replay
 from fabfold.joinery.build import build_bodies
 from fabfold.joinery.cells import eroded_cells, eroded_room
-from fabfold.lattice import FACES, ROTATIONS, load_template
-from fabfold.tree.build import hinge_choice
+from fabfold.lattice.rotations import FACES, ROTATIONS
+from fabfold.lattice.shipped import load_template
+from fabfold.proof.certify import certify
+from fabfold.proof.replay import replay
+from fabfold.tree.assembly import hinge_choice
 from fabfold.tree.catalogue import edge_sides
-from fabfold.tree.check import check_tree
 from fabfold.tree.effort import Effort
+from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.grow import energy_of, fill_beam
-from fabfold.tree.model import FoldTree
+from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.problem import from_features, tree_problem
 from fabfold.tree.rng import generator
-from fabfold.tree.sharing import (
-    octant_masks,
-    seen_depths,
-    shared_octants,
-    turned_masks,
-    unpacked,
-)
+from fabfold.tree.sharing import octant_masks, seen_depths, shared_octants, turned_masks, unpacked
 from fabfold.tree.solve import solve
 from fabfold.tree.starts import grow
 from fabfold.tree.system import hinge_system

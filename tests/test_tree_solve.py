@@ -7,10 +7,10 @@ import pytest
 from tree_cases import animal, face_pairs, solid_problem, strip
 
 from fabfold.errors import NoFoldError, NoTreeError
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.fold.lattice import free_moves
-from fabfold.tree.check import check_tree
+from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.fold.lattice_paths import free_moves
 from fabfold.tree.effort import EFFORTS, Effort
+from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.solve import solve
 from fabfold.tree.starts import grow
 from fabfold.tree.system import hinge_system

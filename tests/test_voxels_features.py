@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fabfold.errors import KitError
-from fabfold.lattice import FACES
+from fabfold.lattice.rotations import FACES
 from fabfold.voxels.features import components, face_pairs, features
-from fabfold.voxels.model import Voxels
-from fabfold.voxels.store import load_voxels, save_voxels
+from fabfold.voxels.voxel_files import load_voxels, save_voxels
+from fabfold.voxels.voxel_model import Voxels
 
 
 def voxels_of(cells: list[tuple[int, int, int]], material: np.ndarray | None = None) -> Voxels:

@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from fabfold.solid.model import Solid
-from fabfold.voxels.offsets import (
-    CellEnergy,
-    best_axis_offsets,
-    cell_energy,
-    optimise_offsets,
-)
-from fabfold.voxels.scan import box_counts, occupancy, summed_volume
+from fabfold.solid.closed_solid import Solid
+from fabfold.solid.scan import box_counts, occupancy, summed_volume
+from fabfold.voxels.offsets import CellEnergy, best_axis_offsets, cell_energy, optimise_offsets
 from fabfold.voxels.warp import split_at_plane, warp_mesh
 
 

@@ -5,22 +5,24 @@ import pytest
 import trimesh
 
 from fabfold.errors import NoVoxelsError, RecipeError
-from fabfold.lattice import Template, load_template, parity
+from fabfold.lattice.rotations import parity
+from fabfold.lattice.shipped import load_template
+from fabfold.lattice.template import Template
 from fabfold.meshes import mesh_volume
-from fabfold.solid.model import Solid
+from fabfold.solid.closed_solid import Solid
+from fabfold.solid.scan import summed_volume
 from fabfold.voxels.features import RIGID_CONTACT, features
-from fabfold.voxels.model import Voxels
-from fabfold.voxels.offsets import CellEnergy
-from fabfold.voxels.placement import (
+from fabfold.voxels.grid_placement import (
     Capacity,
     grid_rotations,
     judge,
     nearby_rotations,
     rank_translations,
 )
-from fabfold.voxels.scan import summed_volume
-from fabfold.voxels.search import shares_of, voxelize
-from fabfold.voxels.store import save_voxels
+from fabfold.voxels.offsets import CellEnergy
+from fabfold.voxels.voxel_files import save_voxels
+from fabfold.voxels.voxel_model import Voxels
+from fabfold.voxels.voxelize import shares_of, voxelize
 
 QUICK = {"placements": 12, "shortlist": 4, "results": 3}
 

@@ -1,9 +1,9 @@
 import pytest
 
-from fabfold.seeds import run_seed
+from fabfold.search.seeds import run_seed
+from fabfold.search.warmup import strip_job
 from fabfold.tree.catalogue import JOINT_SETS, JointSet
-from fabfold.tree.check import check_tree
-from fabfold.warming import strip_job
+from fabfold.tree.kinematics_check import check_tree
 
 
 @pytest.mark.parametrize("joints", JOINT_SETS)

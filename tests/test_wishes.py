@@ -10,34 +10,28 @@ import trimesh
 from tree_cases import face_pairs, strip
 from typer.testing import CliRunner
 
-from fabfold.cli import app
+from fabfold.cli.app import app
 from fabfold.errors import NoTreeError, RecipeError
-from fabfold.fold.foldability import LatticeFoldability
-from fabfold.lattice import FACES, ROTATIONS, load_template, rotation_about
-from fabfold.recipe import make_recipe
-from fabfold.rounds import _usable
+from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.kit.stage_files import load_solid as read_solid
+from fabfold.kit.stage_files import save_solid
+from fabfold.lattice.rotations import FACES, ROTATIONS, rotation_about
+from fabfold.lattice.shipped import load_template
+from fabfold.recipe.recipe import make_recipe
+from fabfold.recipe.recipe_wishes import make_wishes, weights_of, wished
+from fabfold.search.rounds import _usable
 from fabfold.solid.load import load_solid, solid_from_mesh
 from fabfold.solid.raw import RawMesh
-from fabfold.stagefiles import load_solid as read_solid
-from fabfold.stagefiles import save_solid
+from fabfold.solid.regions import area_of, face_named, parse_keep, parse_shape, region_of
 from fabfold.store import StageStore
-from fabfold.tree.check import check_tree
 from fabfold.tree.effort import EFFORTS
+from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.problem import Weights, from_features, tree_problem
 from fabfold.tree.solve import solve
-from fabfold.tree.wishes import Keep, Wishes, hinges_outside, rank_by_cuts, uncut_pairs
 from fabfold.voxels.features import features
-from fabfold.voxels.regions import (
-    area_of,
-    face_named,
-    owners,
-    parse_keep,
-    parse_shape,
-    region_of,
-    to_lattice,
-)
-from fabfold.voxels.search import voxelize
-from fabfold.wishes import make_wishes, weights_of, wished
+from fabfold.voxels.region_cells import owners, to_lattice
+from fabfold.voxels.voxelize import voxelize
+from fabfold.wishes.terms import Keep, Wishes, hinges_outside, rank_by_cuts, uncut_pairs
 
 EFFORT = replace(EFFORTS["quick"], polishing=200, restarts=6)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fabfold.lattice import FACES, load_template, parity
+from fabfold.lattice.rotations import FACES, parity
+from fabfold.lattice.shipped import load_template
 from fabfold.tree.problem import TreeProblem, Weights, tree_problem
 
 

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.tree.model import FoldTree
+from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["body_colours", "hex_colour", "palette"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.fold.model import Motion
-from fabfold.joinery.model import Joinery
-from fabfold.lattice import Template
-from fabfold.tree.model import FoldTree
+from fabfold.fold.motion import Motion
+from fabfold.joinery.bodies import Joinery
+from fabfold.lattice.template import Template
+from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["flat_poses"]
 

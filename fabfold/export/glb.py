@@ -25,9 +25,9 @@ from fabfold.export.colours import body_colours
 from fabfold.export.shading import split_vertices
 from fabfold.export.weld import printable_mesh
 from fabfold.files import write_bytes
-from fabfold.fold.model import Motion
-from fabfold.joinery.model import Joinery
-from fabfold.tree.model import FoldTree
+from fabfold.fold.motion import Motion
+from fabfold.joinery.bodies import Joinery
+from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["SECONDS_PER_QUARTER", "glb_bytes", "keyframe_times", "write_glb"]
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from fabfold.export.colours import body_colours
 from fabfold.export.render import Image, View, camera_for, png_bytes, project, render
 from fabfold.files import write_bytes
-from fabfold.fold.model import Motion
-from fabfold.joinery.model import Joinery
-from fabfold.lattice import ROTATIONS
-from fabfold.solid.model import Solid
-from fabfold.tree.model import FoldTree
+from fabfold.fold.motion import Motion
+from fabfold.joinery.bodies import Joinery
+from fabfold.lattice.rotations import ROTATIONS
+from fabfold.solid.closed_solid import Solid
+from fabfold.tree.fold_tree import FoldTree
 
 __all__ = [
     "View",

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from fabfold.export.colours import body_colours
 from fabfold.export.picture import strip
 from fabfold.export.render import Image, View
-from fabfold.fold.model import Motion
+from fabfold.fold.motion import Motion
+from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.joinery.cells import eroded_room, model_manifold
-from fabfold.joinery.model import BodyMesh, Joinery
-from fabfold.tree.model import FoldTree
-from fabfold.voxels.model import Voxels
+from fabfold.tree.fold_tree import FoldTree
+from fabfold.voxels.voxel_model import Voxels
 
 __all__ = ["picture_of_tree"]
 

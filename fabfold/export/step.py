@@ -1,7 +1,7 @@
 """STEP: the bodies as named solids in shape A, with true cylinders and cones at the hinges.
 
 A body's mesh is thinned where it is sculpted, turned into faces (see
-:mod:`fabfold.export.regions`), written as STEP text, read
+:mod:`fabfold.export.surfaces`), written as STEP text, read
 back with the CAD kernel, and compared with the mesh. A body whose solid is not valid, or differs
 from its mesh, is written again with flat faces only, and then triangle by triangle.
 """
@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.export.brep import Brep, brep_of
+from fabfold.export.body_brep import Brep, brep_of
 from fabfold.export.colours import body_colours, palette
-from fabfold.export.regions import (
+from fabfold.export.steptext import StepSolid, step_text
+from fabfold.export.surfaces import (
     Axis,
     Plane,
     Surface,
@@ -26,14 +27,13 @@ from fabfold.export.regions import (
     round_regions,
     sculpted_triangles,
 )
-from fabfold.export.steptext import StepSolid, step_text
 from fabfold.export.thin import thinned
 from fabfold.export.weld import weld
 from fabfold.files import write_text
-from fabfold.joinery.model import BodyMesh, Joinery
+from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.meshes import mesh_volume
 from fabfold.progress import Progress, SilentProgress
-from fabfold.tree.model import FoldTree
+from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["StepFacts", "write_step"]
 
@@ -127,7 +127,7 @@ def write_step(
     GeometryError
         If the CAD kernel finds no valid solid for a body, even from plain triangles.
     """
-    from fabfold import __version__
+    from fabfold.version import __version__
 
     told = progress or SilentProgress()
     if colours is None:

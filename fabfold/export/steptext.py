@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fabfold.export.brep import Brep, Edge, Face
-from fabfold.export.regions import Axis, Plane
+from fabfold.export.body_brep import Brep, BrepEdge, Face
+from fabfold.export.surfaces import Axis, Plane
 
 __all__ = ["StepSolid", "step_text"]
 
@@ -101,7 +101,7 @@ def _axes_of(axis: Axis) -> tuple[list[float], list[float]]:
     return unit[axis.direction].tolist(), unit[(axis.direction + 1) % 3].tolist()
 
 
-def _edge(writer: _Writer, brep: Brep, edge: Edge, vertex: dict[int, int]) -> int:
+def _edge(writer: _Writer, brep: Brep, edge: BrepEdge, vertex: dict[int, int]) -> int:
     start, end = brep.vertices[edge.start], brep.vertices[edge.end]
     if edge.axis is None:
         along = end - start

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fabfold.export.weld import printable_mesh
 from fabfold.files import write_bytes
-from fabfold.joinery.model import Joinery
+from fabfold.joinery.bodies import Joinery
 
 __all__ = ["stl_bytes", "write_combined_stl", "write_stl"]
 

@@ -40,7 +40,7 @@ from fabfold.errors import GeometryError
 from fabfold.export.colours import palette
 from fabfold.export.weld import printable_mesh
 from fabfold.files import replacing
-from fabfold.joinery.model import Joinery
+from fabfold.joinery.bodies import Joinery
 
 __all__ = ["Layout", "posed", "write_3mf"]
 
@@ -126,7 +126,7 @@ def write_3mf(
     """
     import lib3mf
 
-    from fabfold import __version__
+    from fabfold.version import __version__
 
     if colours is None:
         colours = palette(len(joinery.bodies))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.joinery.model import BodyMesh
+from fabfold.joinery.bodies import BodyMesh
 from fabfold.meshes import mesh_volume
 
 __all__ = ["is_closed", "printable_mesh", "weld"]

@@ -13,23 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.fold.model import Motion
-from fabfold.lattice import rotation_about
-from fabfold.tree.model import FoldTree
+from fabfold.fold.motion import Motion
+from fabfold.lattice.rotations import rotation_about
+from fabfold.lattice.segments import INSET, LEAST
+from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.system import HingeSystem
 
 __all__ = [
-    "INSET",
-    "LEAST",
     "Encounter",
     "encounter_on_lattice",
     "first_encounter",
     "segment_distance",
 ]
-
-#: For a barrel radius of 1/8 of the voxel and a clearance of 1/67 (2.5 and 0.3 mm at 20 mm).
-INSET = LEAST = 0.265
-
 
 #: Samples of a quarter turn; the nearest one is looked at again as finely between its neighbours.
 _SAMPLES = 24

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.creases import Parts, folded_template, line_of, parts_of, rim_of
-from fabfold.fold.lattice import free_moves
-from fabfold.lattice import Template
-from fabfold.tree.model import Body, Edge, FoldTree, Hinge
+from fabfold.fold.lattice_paths import free_moves
+from fabfold.lattice.creases import Parts, folded_template, line_of, parts_of, rim_of
+from fabfold.lattice.template import Template
+from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
 from fabfold.tree.solve import Candidate
 from fabfold.tree.system import hinge_system
 

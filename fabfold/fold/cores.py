@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.fold.sweep import SweepTable, sweep_table
+from fabfold.lattice.sweep import SweepTable, sweep_table
 
 __all__ = ["CORE", "core_table", "cores_meet"]
 
@@ -30,7 +30,7 @@ CORE = 0.325
 def cores_meet(a: int, b: int, c: int, d: int, margin: float) -> bool:
     """Whether, at some radius, the arc of core (c, d) ends after the arc of core (a, b) begins.
 
-    As :func:`fabfold.fold.sweep.arcs_overlap`, for squares less a margin on all sides.
+    As :func:`fabfold.lattice.sweep.arcs_overlap`, for squares less a margin on all sides.
     """
     a0, a1, b0 = a + margin, a + 1.0 - margin, b + margin
     c0, d0, c1, d1 = c + margin, d + margin, c + 1.0 - margin, d + 1.0 - margin
@@ -83,7 +83,7 @@ def _kept(
 
 @cache
 def core_table(reach: int, half_side: float = CORE) -> SweepTable:
-    """As :func:`fabfold.fold.sweep.sweep_table`, for the cores of whole cells.
+    """As :func:`fabfold.lattice.sweep.sweep_table`, for the cores of whole cells.
 
     Parameters
     ----------

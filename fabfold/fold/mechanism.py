@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.lattice import ROTATION_PRODUCT, ROTATIONS, rotation_about, rotation_index
+from fabfold.lattice.rotations import ROTATION_PRODUCT, ROTATIONS, rotation_about, rotation_index
 from fabfold.tree.system import HingeSystem
 
 __all__ = ["Mechanism", "Scene", "clear_scene", "mechanism", "pose_scene", "scene"]

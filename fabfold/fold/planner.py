@@ -19,7 +19,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.fold.front import (
+from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, pose_scene
+from fabfold.fold.open_list import (
     Front,
     begin,
     distance,
@@ -31,9 +32,8 @@ from fabfold.fold.front import (
     retarget,
     slot_of,
 )
-from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, pose_scene
-from fabfold.fold.sweep import SweepTable
 from fabfold.fold.turns import Work, obstacles, workspace, world_turn
+from fabfold.lattice.sweep import SweepTable
 
 __all__ = ["plan"]
 

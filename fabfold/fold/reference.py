@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.fold.barrels import INSET, LEAST, segment_distance
-from fabfold.fold.plates import BARREL_HALF, PLATE_CORE, PLATE_HALF, PLATE_LEAST, POST_LEAST
-from fabfold.lattice import rotation_about
+from fabfold.fold.barrels import segment_distance
+from fabfold.lattice.plate_sweep import BARREL_HALF, PLATE_CORE, PLATE_HALF, PLATE_LEAST, POST_LEAST
+from fabfold.lattice.rotations import rotation_about
+from fabfold.lattice.segments import INSET, LEAST
 from fabfold.tree.system import HingeSystem
 
 __all__ = [

@@ -9,8 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, pose_scene
-from fabfold.fold.sweep import SweepTable
 from fabfold.fold.turns import Work, obstacles, workspace
+from fabfold.lattice.sweep import SweepTable
 
 __all__ = ["cuts_on", "follow", "shorten"]
 

@@ -1,6 +1,6 @@
 """Kernels that choose, for cells that run into each other, which one gives way on which rings.
 
-See :mod:`fabfold.fold.carving`. Rings are as wide as a subvoxel; in each ring and layer, the
+See :mod:`fabfold.fold.carving_plan`. Rings are as wide as a subvoxel; in each ring and layer, the
 least angle of the first cell's material and the largest of the second's decide what is in the way.
 """
 

@@ -11,8 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, edge_slot, pose_scene
-from fabfold.fold.sweep import SweepTable
-from fabfold.lattice import ROTATIONS
+from fabfold.lattice.rotations import ROTATIONS
+from fabfold.lattice.sweep import SweepTable
 
 __all__ = [
     "Work",
@@ -232,7 +232,7 @@ def obstacles(  # noqa: PLR0912, PLR0915 - one pass, kept whole for speed
     mech, at
         The mechanism and its scene, posed.
     table
-        Sweeps up to the reach of the mechanism, see :func:`fabfold.fold.sweep.sweep_table`.
+        Sweeps up to the reach of the mechanism, see :func:`fabfold.lattice.sweep.sweep_table`.
     work
         Its `found` gets the pairs.
 

@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
 from fabfold.fold.barrels import first_encounter
-from fabfold.fold.model import Motion
+from fabfold.fold.motion import Motion
+from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.joinery.carving import Carved, carve
 from fabfold.joinery.cells import eroded_cells, eroded_room, model_manifold
 from fabfold.joinery.cutting import Cut, less, meeting, united
 from fabfold.joinery.grooves import Passage, passages
+from fabfold.joinery.hinge_placement import fittings
 from fabfold.joinery.links import link_body
-from fabfold.joinery.model import BodyMesh, Joinery
-from fabfold.joinery.placement import fittings
-from fabfold.joinery.plates import plate_passages
+from fabfold.joinery.one_piece import CRUMB_SHARE, MendTally, one_piece
+from fabfold.joinery.pockets import plate_passages
 from fabfold.joinery.sizes import HingeSize, hinge_size, strut_width
 from fabfold.joinery.soundness import finish_mesh
-from fabfold.joinery.unite import CRUMB_SHARE, Tally, one_piece
 from fabfold.progress import Progress, SilentProgress
-from fabfold.tree.model import FoldTree
+from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import WHOLE
-from fabfold.voxels.model import Voxels
+from fabfold.voxels.voxel_model import Voxels
 
 if TYPE_CHECKING:
     import manifold3d
@@ -114,7 +114,7 @@ def build_bodies(
         voxel_mm=voxel_mm,
         clearance_mm=clearance_mm,
     )
-    tally = Tally()
+    tally = MendTally()
     origin = voxel_mm * (0.5 - tree.source.min(axis=0).astype(float))
     meshes = []
     for index, body in enumerate(tree.bodies):
@@ -146,7 +146,7 @@ def build_bodies(
     )
 
 
-def _notes(tally: Tally, voxel_mm: float, links: int) -> tuple[str, ...]:
+def _notes(tally: MendTally, voxel_mm: float, links: int) -> tuple[str, ...]:
     notes = []
     if tally.carved_cells:
         notes.append(
@@ -221,7 +221,7 @@ def _refuse_encounters(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm
 
 
 def _body(
-    cut: Cut, model: manifold3d.Manifold, rounded: Carved, tally: Tally
+    cut: Cut, model: manifold3d.Manifold, rounded: Carved, tally: MendTally
 ) -> manifold3d.Manifold:
     """One body as one connected solid, lattice origin at zero."""
     voxel_mm = cut.voxel_mm
@@ -257,7 +257,7 @@ def _body(
 
 
 def _room(
-    cut: Cut, cells: NDArray[np.int32], model: manifold3d.Manifold, tally: Tally
+    cut: Cut, cells: NDArray[np.int32], model: manifold3d.Manifold, tally: MendTally
 ) -> manifold3d.Manifold:
     """Where the body may be: its cells, and of those that are shared in B its own eighths."""
     inset = cut.size.clearance_mm / 2

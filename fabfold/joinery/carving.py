@@ -1,12 +1,12 @@
 """Carving: room for cells that run into each other on the folding path.
 
-:mod:`fabfold.fold.carving` says which two cells meet and which of them gives way on which circles
-about the axis. Here the cut is worked out on the solids. All that the other body has in its cell,
-hinges included, is looked at in slabs across the axis and in rings about it; in each ring the
-angle at which it begins (or ends) is exact. What gives way loses the ring from there on, and the
-clearance all around. So the tool contains all that the other sweeps and goes beyond it by the
-width of a ring and a slab at most. Meetings are worked out one after the other, and what is gone by
-then sweeps nothing.
+:mod:`fabfold.fold.carving_plan` says which two cells meet and which of them gives way on which
+circles about the axis. Here the cut is worked out on the solids. All that the other body has in its
+cell, hinges included, is looked at in slabs across the axis and in rings about it; in each ring
+the angle at which it begins (or ends) is exact. What gives way loses the ring from that angle on,
+and the clearance all around. So the tool contains all that the other sweeps and goes beyond it by
+the width of a ring and a slab at most. Meetings are worked out one after the other, and what is
+gone by then sweeps nothing.
 
 Struts come later. They keep to where nothing passes: those of the body that gives way are kept out
 of the cut, and those of the other behind what it was seen to have.
@@ -23,14 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.fold.carving import Carving, plan_carving, skin_of
-from fabfold.fold.interlock import Meeting
-from fabfold.fold.model import Motion
-from fabfold.fold.motion import quarter_path
+from fabfold.fold.carving_plan import Carving, plan_carving, skin_of
+from fabfold.fold.clashes import Meeting
+from fabfold.fold.motion import Motion, quarter_path
 from fabfold.joinery.cells import eroded_cells, occupancy
-from fabfold.tree.model import FoldTree
+from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.system import hinge_system
-from fabfold.voxels.model import Voxels
+from fabfold.voxels.voxel_model import Voxels
 
 if TYPE_CHECKING:
     import manifold3d

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
 from fabfold.tree.sharing import WHOLE, unpacked
-from fabfold.voxels.model import Voxels
+from fabfold.voxels.voxel_model import Voxels
 
 if TYPE_CHECKING:
     import manifold3d

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
 from fabfold.joinery.grooves import Passage, groove_tools
-from fabfold.joinery.placement import Fittings, knuckle_zone
-from fabfold.joinery.plates import plate_tools
+from fabfold.joinery.hinge_placement import Fittings, knuckle_zone
+from fabfold.joinery.pockets import plate_tools
 from fabfold.joinery.sizes import HingeSize
-from fabfold.tree.model import FoldTree
+from fabfold.tree.fold_tree import FoldTree
 
 if TYPE_CHECKING:
     import manifold3d

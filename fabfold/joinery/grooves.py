@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.fold.model import Motion
-from fabfold.tree.model import Edge, FoldTree
+from fabfold.fold.motion import Motion
+from fabfold.tree.fold_tree import Edge, FoldTree
 
 if TYPE_CHECKING:
     import manifold3d
@@ -50,7 +50,7 @@ Floats = NDArray[np.float64]
 class Passage:
     """One way in which a barrel comes past a body, in the body's own frame (its place in A).
 
-    Link plates pass in the same ways (:mod:`fabfold.joinery.plates`).
+    Link plates pass in the same ways (:mod:`fabfold.joinery.pockets`).
 
     Attributes
     ----------

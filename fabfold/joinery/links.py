@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from fabfold.errors import GeometryError
 from fabfold.joinery.cutting import Cut, bounds, less, meeting
-from fabfold.joinery.placement import Plate, knuckle_zone
+from fabfold.joinery.hinge_placement import Plate, knuckle_zone
+from fabfold.joinery.one_piece import CRUMB_SHARE, MendTally
 from fabfold.joinery.sizes import MIN_WALL_MM
-from fabfold.joinery.unite import CRUMB_SHARE, Tally
 
 if TYPE_CHECKING:
     import manifold3d
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 __all__ = ["link_body"]
 
 
-def link_body(cut: Cut, tally: Tally) -> manifold3d.Manifold:
+def link_body(cut: Cut, tally: MendTally) -> manifold3d.Manifold:
     """The link of a double hinge as one connected solid, lattice origin at zero.
 
     Parameters
     ----------
     cut : Cut
         ``cut.index`` is the link's.
-    tally : Tally
+    tally : MendTally
         Counts what was cut from links.
 
     Raises

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.fold.model import Motion
+from fabfold.fold.motion import Motion
+from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.joinery.cells import as_manifold
-from fabfold.joinery.model import BodyMesh, Joinery
 from fabfold.printing.profiles import Profile
 from fabfold.printing.thickness import ray_thickness
 from fabfold.progress import Progress, SilentProgress
-from fabfold.tree.model import FoldTree
+from fabfold.tree.fold_tree import FoldTree
 
 if TYPE_CHECKING:
     import manifold3d

@@ -14,14 +14,14 @@ import numpy as np
 
 from fabfold.errors import ModelError
 from fabfold.files import sha256_of
+from fabfold.solid.closed_solid import Solid
 from fabfold.solid.convert import thinned, to_mesh
-from fabfold.solid.model import Solid
 from fabfold.solid.paint import painted_faces
 from fabfold.solid.pieces import one_piece
 from fabfold.solid.raw import RawMesh
 from fabfold.solid.surface import OpenSurfaceError, close_surface
 from fabfold.solid.topology import Points
-from fabfold.solid.unite import MAX_TRIANGLES, unite
+from fabfold.solid.union import MAX_TRIANGLES, unite
 
 __all__ = ["FORMATS", "load_solid", "solid_from_mesh"]
 
@@ -33,13 +33,13 @@ MIN_THICKNESS = 0.01
 MIN_STEPS = 1_000
 
 
-def load_solid(source: str | Path) -> Solid:
+def load_solid(path: str | Path) -> Solid:
     """Load a model as one closed, outward-oriented manifold.
 
     Parameters
     ----------
-    source : str or Path
-        A file in one of :data:`FORMATS`, or ``"sample:NAME"`` for a built-in sample.
+    path : str or Path
+        A file in one of :data:`FORMATS`.
 
     Returns
     -------
@@ -61,12 +61,7 @@ def load_solid(source: str | Path) -> Solid:
     meshes above 200,000 triangles are thinned; a model thinner than 1 % of its longest side is
     refused.
     """
-    text = str(source)
-    if text.startswith("sample:"):
-        from fabfold.solid.samples import load_sample
-
-        return load_sample(text.removeprefix("sample:"))
-    path = Path(source)
+    path = Path(path)
     read = _reader(path)
     try:
         raw = read(path)

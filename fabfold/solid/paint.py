@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.solid.model import Paint
+from fabfold.solid.closed_solid import Paint
 
 __all__ = ["colours_of_corners", "colours_of_mesh", "painted_faces"]
 

@@ -10,16 +10,7 @@ from numpy.typing import NDArray
 from fabfold.errors import ModelError
 from fabfold.solid.polygon import triangulate_loop
 from fabfold.solid.sew import sew
-from fabfold.solid.topology import (
-    Edges,
-    Faces,
-    Points,
-    face_areas,
-    orient,
-    patches,
-    shells,
-    weld,
-)
+from fabfold.solid.topology import Edges, Faces, Points, face_areas, orient, patches, shells, weld
 from fabfold.solid.words import were
 
 __all__ = ["OpenSurfaceError", "Shell", "close_surface"]

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.lattice import FACES, rotation_about, rotation_index
+from fabfold.lattice.rotations import FACES, rotation_about, rotation_index
 
 __all__ = [
     "JOINT_SETS",
@@ -45,7 +45,8 @@ class Joint:
     kind : str
         ``"R"``, ``"S"`` or ``"D"``.
     face : int
-        Index in :data:`fabfold.lattice.FACES` of the parent's face that the child stands on.
+        Face of the parent that the child stands on, index in
+        :data:`fabfold.lattice.rotations.FACES`.
     sides : tuple of int
         For each axis, which edge of the face it lies on: 0 to 3, see :func:`edge_sides`.
     turns : tuple of int
@@ -54,7 +55,8 @@ class Joint:
     offset : tuple of int
         Where the child's cell goes, relative to the parent's, in the parent's frame.
     rotation : int
-        Index in :data:`fabfold.lattice.ROTATIONS` of the child's turn in the parent's frame.
+        The child's turn in the parent's frame, index in
+        :data:`fabfold.lattice.rotations.ROTATIONS`.
     """
 
     kind: str

@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabfold.tree.cell_occupancy import clash, close, occupy, saved, seen_twice
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import mix, random_float
-from fabfold.tree.room import clash, close, occupy, saved, seen_twice
 
 __all__ = ["clusters", "doubles_needed", "energy_of", "fill_beam", "pieces"]
 

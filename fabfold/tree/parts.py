@@ -1,6 +1,6 @@
 """Templates that fold once more: which voxels go into which part, and what that forbids.
 
-A template with creases (:mod:`fabfold.creases`) is filled like any other, but two bodies in
+A template with creases (:mod:`fabfold.lattice.creases`) is filled like any other, but two bodies in
 different parts may be joined across a crease only, by one hinge each, so that the crease can turn
 in the end. The voxels are therefore shared out before the search: each part gets a connected group
 of them, all joints between groups are forbidden but one pair of voxels for each crease, and these
@@ -14,18 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.creases import Parts, folded_template, line_of, parts_of, rim_of
 from fabfold.errors import NoTreeError
-from fabfold.lattice import (
-    FACES,
-    ROTATION_INVERSE,
-    ROTATION_PRODUCT,
-    ROTATIONS,
-    Template,
-    parity,
-)
+from fabfold.lattice.creases import Parts, folded_template, line_of, parts_of, rim_of
+from fabfold.lattice.rotations import FACES, ROTATION_INVERSE, ROTATION_PRODUCT, ROTATIONS, parity
+from fabfold.lattice.template import Template
 from fabfold.tree.problem import TreeProblem, cost_table
-from fabfold.tree.wedge import hinge_tables
+from fabfold.tree.swept_cells import hinge_tables
 
 __all__ = ["parted"]
 

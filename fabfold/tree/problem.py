@@ -11,20 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import NoTreeError
-from fabfold.lattice import FACES, ROTATION_PRODUCT, ROTATIONS, Template, parity
+from fabfold.lattice.rotations import FACES, ROTATION_PRODUCT, ROTATIONS, parity
+from fabfold.lattice.template import Template
 from fabfold.tree.catalogue import Joint, JointSet, joint_rows, ways
-from fabfold.tree.sharing import (
-    WHOLE,
-    beside,
-    most_shared,
-    octant_masks,
-    seen_depths,
-    turned_masks,
-)
+from fabfold.tree.sharing import WHOLE, beside, most_shared, octant_masks, seen_depths, turned_masks
 
 if TYPE_CHECKING:
     from fabfold.voxels.features import Features
-    from fabfold.voxels.model import Voxels
+    from fabfold.voxels.voxel_model import Voxels
 
 __all__ = [
     "Tables",

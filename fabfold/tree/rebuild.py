@@ -8,11 +8,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabfold.tree.cell_occupancy import find_guests
 from fabfold.tree.grow import clusters, pieces
 from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_float
-from fabfold.tree.room import find_guests
-from fabfold.tree.wedge import HingeTables, blocked, double_blocked
+from fabfold.tree.swept_cells import HingeTables, blocked, double_blocked
 
 __all__ = [
     "COLUMNS",

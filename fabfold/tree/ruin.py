@@ -8,12 +8,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabfold.tree.cell_occupancy import holders, one_of
 from fabfold.tree.grow import clusters, energy_of, fill_beam
 from fabfold.tree.problem import Tables
 from fabfold.tree.rebuild import COLUMNS, apart, candidates, hinge_rows, loose_pieces
 from fabfold.tree.rng import random_below, random_float
-from fabfold.tree.room import holders, one_of
-from fabfold.tree.wedge import HingeTables
+from fabfold.tree.swept_cells import HingeTables
 
 __all__ = ["propose", "repair", "ruin"]
 

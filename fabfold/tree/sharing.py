@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.lattice import FACES, ROTATIONS
+from fabfold.lattice.rotations import FACES, ROTATIONS
 
 __all__ = [
     "LEAST",

@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import NoFoldError, NoTreeError
-from fabfold.tree.build import HingeChoice, SpanningTree, fold_tree, hinge_choice
+from fabfold.tree.assembly import HingeChoice, SpanningTree, fold_tree, hinge_choice
 from fabfold.tree.effort import Effort
+from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.foldability import Foldability, Outlook
 from fabfold.tree.grow import energy_of
-from fabfold.tree.model import FoldTree
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.rebuild import loose_pieces
 from fabfold.tree.rng import generator
 from fabfold.tree.ruin import propose
 from fabfold.tree.starts import grow
-from fabfold.tree.wedge import hinge_tables
+from fabfold.tree.swept_cells import hinge_tables
 
 __all__ = ["Candidate", "Statistics", "solve"]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.lattice import parity
+from fabfold.lattice.rotations import parity
 from fabfold.tree.grow import fill_beam
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.rng import generator

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.tree.model import FoldTree
+from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import unpacked
 
 __all__ = ["HingeSystem", "hinge_system"]
@@ -48,7 +48,7 @@ class HingeSystem(NamedTuple):
 
 
 def hinge_system(tree: FoldTree) -> HingeSystem:
-    """Arrays of a :class:`~fabfold.tree.model.FoldTree` (its hinges run along +x, +y or +z)."""
+    """Arrays of a :class:`~fabfold.tree.fold_tree.FoldTree` (its hinges run along +x, +y or +z)."""
     directions = np.array([h.direction for h in tree.hinges], dtype=np.int32).reshape(-1, 3)
     axis = np.abs(directions).argmax(axis=1).astype(np.int8)
     sign = directions.sum(axis=1)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.lattice import parity
+from fabfold.lattice.rotations import parity
 from fabfold.meshes import mesh_volume
+from fabfold.solid.scan import occupancy
 from fabfold.voxels.features import RIGID_CONTACT, components, face_pairs, main_contact
-from fabfold.voxels.model import SUBDIVISION, Voxels
+from fabfold.voxels.grid_placement import MEND_BELOW, Capacity
 from fabfold.voxels.offsets import CellEnergy
-from fabfold.voxels.placement import MEND_BELOW, Capacity
-from fabfold.voxels.scan import occupancy
+from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 from fabfold.voxels.warp import warp_mesh
 
 __all__ = ["Placement", "colours_fit", "cut_voxels"]

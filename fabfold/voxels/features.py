@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.lattice import FACES
-from fabfold.voxels.model import SUBDIVISION, Voxels
+from fabfold.lattice.rotations import FACES
+from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 
 __all__ = [
     "DOUBLE_CONTACT",
@@ -52,13 +52,13 @@ class Features:
         The main pieces of both voxels touch enough (`RIGID_CONTACT`) to be one printed piece.
     hinge : (m, 4) bool array
         Which edges of the shared face can hold a printed single hinge. An edge is named by its
-        outward direction in the face, in the order of :data:`fabfold.lattice.FACES` without the
-        two directions of the face's normal.
+        outward direction in the face, in the order of
+        :data:`fabfold.lattice.rotations.FACES` without the two directions of the face's normal.
     double : (m,) bool array
         The contact leaves room for a double hinge (`DOUBLE_CONTACT`).
     depth : (n, 6) float64 array
         Mean depth to the first material of rays shot into the voxel from each face, in the order of
-        :data:`fabfold.lattice.FACES`; 0 is a full face, 1 an empty voxel (Eq. 8).
+        :data:`fabfold.lattice.rotations.FACES`; 0 is a full face, 1 an empty voxel (Eq. 8).
     pieces : (n,) int32 array
         Pieces of material in the cell that do not hang together within it.
     main : (n,) float64 array

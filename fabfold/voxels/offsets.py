@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.voxels.scan import box_counts
+from fabfold.solid.scan import box_counts
 
 __all__ = [
     "CellEnergy",
@@ -176,7 +176,7 @@ def best_axis_offsets(
     Parameters
     ----------
     table : int32 array
-        From :func:`fabfold.voxels.scan.summed_volume`.
+        From :func:`fabfold.solid.scan.summed_volume`.
     regular : three int64 arrays
         The planes of the regular grid, in subvoxels.
     offsets : three int64 arrays
@@ -215,7 +215,7 @@ def optimise_offsets(
     Parameters
     ----------
     table : int32 array
-        From :func:`fabfold.voxels.scan.summed_volume`.
+        From :func:`fabfold.solid.scan.summed_volume`.
     regular : three int64 arrays
         The planes of the regular grid, in subvoxels; the outermost ones do not move.
     limit : int

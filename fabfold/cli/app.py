@@ -1,0 +1,422 @@
+"""The command line: commands only, no logic; heavy imports stand inside the commands."""
+
+from __future__ import annotations
+
+import functools
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fabfold.errors import CheckError, FabfoldError
+from fabfold.version import __version__
+
+if TYPE_CHECKING:
+    from fabfold.kit.kit import Kit
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="fabfold",
+    help="Turn a 3D model into one printed object that folds into a box, and prove that it folds.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Source = Annotated[
+    str,
+    typer.Argument(
+        metavar="MODEL",
+        help="STL, OBJ, PLY, OFF, GLB, 3MF or STEP file; sample:NAME; a kit.toml; or a kit folder.",
+        show_default=False,
+    ),
+]
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", metavar="KIT", help="Kit folder. Default: NAME-kit."),
+]
+TemplateName = Annotated[
+    str | None,
+    typer.Option(
+        "--template",
+        "-t",
+        help="Target shape: box-AxBxC, a name of 'fabfold list templates', a .toml file, or a "
+        "mesh. Default: the sample's own, else box-4x4x4.",
+    ),
+]
+TemplateCells = Annotated[
+    int | None,
+    typer.Option(
+        "--template-cells",
+        help="Cells of a target that is a mesh. Default: the best match from 32 to 128.",
+    ),
+]
+VoxelMm = Annotated[
+    float | None, typer.Option("--voxel-mm", help="Printed side of a voxel in mm. Default: 20.")
+]
+ProfileName = Annotated[
+    str | None,
+    typer.Option(
+        "--profile",
+        help="Printer and material: a name of 'fabfold list profiles', or a .toml file.",
+    ),
+]
+ClearanceMm = Annotated[
+    float | None,
+    typer.Option("--clearance-mm", help="Gap in hinges and between faces. Default: the profile's."),
+]
+Seed = Annotated[
+    int | None, typer.Option("--seed", help="Seed of every random choice. Default: 1.")
+]
+Effort = Annotated[
+    str | None, typer.Option("--effort", help="quick, normal (default) or thorough search.")
+]
+Rounds = Annotated[
+    int | None, typer.Option("--rounds", help="Rounds of seeds before giving up. Default: 8.")
+]
+Rotation = Annotated[
+    str | None,
+    typer.Option(
+        "--rotation", metavar="X,Y,Z", help="Turn the model by hand, degrees about x, y, z."
+    ),
+]
+Origin = Annotated[
+    str | None,
+    typer.Option(
+        "--origin",
+        metavar="X,Y,Z",
+        help="Corner of the grid by hand, in model units after the rotation.",
+    ),
+]
+Pitch = Annotated[float | None, typer.Option("--pitch", help="Voxel side by hand, in model units.")]
+DropBelow = Annotated[
+    float | None,
+    typer.Option(
+        "--drop-below", help="Drop cells with less material than this share. Default: 0.04."
+    ),
+]
+Prefer = Annotated[
+    str | None,
+    typer.Option(
+        "--prefer",
+        metavar="hinges|surface|balanced|0..1",
+        help="Fewest hinges (0), the best surface (1), or between. Default: balanced (0.5).",
+    ),
+]
+Void = Annotated[
+    str | None,
+    typer.Option(
+        "--void",
+        metavar="inside|even|surface|-1..1",
+        help="Where empty space goes: inside the box (1), at its surface (-1). Default: even (0).",
+    ),
+]
+Keep = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--keep",
+        metavar="WHAT:SIDE",
+        help="Show a part of the model on a side of the box: 'front:+x', 'top:+z' (front is the "
+        "model's -y), or a region such as 'box(0,0,50%,100%,100%,100%):top'. Repeatable.",
+    ),
+]
+KeepWeight = Annotated[
+    float | None,
+    typer.Option("--keep-weight", help="How much --keep counts; a hinge is 0.1. Default: 0.3."),
+]
+Protect = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--protect",
+        metavar="REGION",
+        help="No cut may cross this region of the model: 'sphere(x,y,z,r)', "
+        "'box(x0,y0,z0,x1,y1,z1)' in model units or with % of its extent, 'painted' or "
+        "'painted(#rrggbb)' for faces in another colour. Repeatable.",
+    ),
+]
+Joints = Annotated[
+    str | None,
+    typer.Option(
+        "--joints",
+        help="Hinges to search with: S (single, the default), S+D (double ones too), S90 or all "
+        "(quarter turns too).",
+    ),
+]
+DoubleWeight = Annotated[
+    float | None,
+    typer.Option(
+        "--double-weight", help="Energy of a double hinge; a single is 0.1. Default: 0.12."
+    ),
+]
+JointsInside = Annotated[
+    bool | None,
+    typer.Option(
+        "--joints-inside/--joints-anywhere",
+        help="No hinge on the visible faces of the box; it needs a template with some cells to "
+        "spare, and finds less. Default: anywhere.",
+        show_default=False,
+    ),
+]
+Share = Annotated[
+    bool | None,
+    typer.Option(
+        "--share/--no-share",
+        help="Two partly filled voxels may share a cell of the box where their material does not "
+        "overlap. Default: no.",
+        show_default=False,
+    ),
+]
+Pick = Annotated[
+    int | None,
+    typer.Option("--pick", min=0, help="Go on with this solution of 'fit --pareto'; 0 unpicks."),
+]
+Pareto = Annotated[
+    bool,
+    typer.Option(
+        "--pareto",
+        help="List the solutions between fewest joints and best surface, with a picture of each.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", "-j", help="Processes of the search. Default: one a core. Changes no result."
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="tcp://HOST:PORT",
+        help="Search on the workers of this Dask scheduler instead. Changes no result.",
+    ),
+]
+Time = Annotated[
+    float | None,
+    typer.Option(
+        "--time",
+        metavar="SECONDS",
+        min=0,
+        help="Search for so long, then go on with the best so far; 0 takes what earlier runs left. "
+        "The result depends on how fast the machine is; without this option it never does.",
+        show_default=False,
+    ),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")]
+
+
+def _guarded(command: Callable[..., None]) -> Callable[..., None]:
+    """Turn what fabfold reports, and Ctrl-C, into one sentence and an exit code."""
+
+    @functools.wraps(command)
+    def run(*args: Any, **kwargs: Any) -> None:
+        try:
+            command(*args, **kwargs)
+        except FabfoldError as error:
+            typer.echo(f"fabfold: {error}", err=True)
+            raise typer.Exit(error.exit_code) from None
+        except KeyboardInterrupt:
+            typer.echo(
+                "fabfold: stopped; what is done is kept, the same command goes on from there",
+                err=True,
+            )
+            raise typer.Exit(130) from None
+
+    return run
+
+
+def _triple(text: str | None, option: str) -> tuple[float, float, float] | None:
+    if text is None:
+        return None
+    from fabfold.errors import RecipeError
+
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise RecipeError(f"{option} wants three numbers such as 0,90,0, found {text!r}") from None
+    return (x, y, z)
+
+
+def _number(text: str | None) -> float | str | None:
+    """A number where the text is one, else the text."""
+    try:
+        return text if text is None else float(text)
+    except ValueError:
+        return text
+
+
+def _kit(source: str, output: Path | None, quiet: bool, **options: Any) -> Kit:
+    from fabfold.cli.console import ConsoleListener
+    from fabfold.kit.kit import open_kit
+
+    for name in ("rotation", "origin"):
+        options[name] = _triple(options[name], f"--{name}")
+    for name in ("keep", "protect"):
+        options[name] = options[name] or None
+    for name in ("prefer", "void"):
+        options[name] = _number(options[name])
+    if output is None and not (Path(source).is_dir() or source.endswith(".toml")):
+        output = Path(f"{Path(source.removeprefix('sample:')).stem}-kit")
+    kit = open_kit(source, folder=output, **options)
+    if not quiet:
+        kit.listener = ConsoleListener()
+    return kit
+
+
+def _stage(name: str, summary: str) -> None:
+    """Register the command of one stage; all take the same options."""
+
+    def command(
+        source: Source,
+        output: Output = None,
+        template: TemplateName = None,
+        template_cells: TemplateCells = None,
+        voxel_mm: VoxelMm = None,
+        profile: ProfileName = None,
+        clearance_mm: ClearanceMm = None,
+        seed: Seed = None,
+        effort: Effort = None,
+        rounds: Rounds = None,
+        drop_below: DropBelow = None,
+        rotation: Rotation = None,
+        origin: Origin = None,
+        pitch: Pitch = None,
+        prefer: Prefer = None,
+        void: Void = None,
+        keep: Keep = None,
+        keep_weight: KeepWeight = None,
+        protect: Protect = None,
+        joints: Joints = None,
+        double_weight: DoubleWeight = None,
+        joints_inside: JointsInside = None,
+        share: Share = None,
+        pick: Pick = None,
+        workers: Workers = None,
+        scheduler: Scheduler = None,
+        time: Time = None,
+        pareto: Pareto = False,
+        quiet: Quiet = False,
+    ) -> None:
+        options = dict(locals())
+        for key in ("name", "summary", "pareto"):
+            options.pop(key, None)
+        options["seconds"] = options.pop("time")
+        kit = _kit(**options)
+        if pareto:
+            _show_pareto(kit, name)
+            return
+        kit.run(name)
+        from fabfold.cli.console import show_result
+
+        show_result(kit, name)
+        if name in ("check", "export") and not all(check.ok for check in kit.check()):
+            raise typer.Exit(CheckError.exit_code)
+
+    command.__name__ = name
+    app.command(name, help=summary)(_guarded(command))
+
+
+def _show_pareto(kit: Kit, stage: str) -> None:
+    from fabfold.cli.console import show_pareto
+    from fabfold.errors import RecipeError
+
+    if stage != "fit":
+        raise RecipeError(f"--pareto goes with 'fabfold fit', not with {stage!r}")
+    kit.list_pareto()
+    show_pareto(kit)
+
+
+_stage("voxelize", "Cut the model into voxels.")
+_stage("fit", "Find joint trees that carry the voxels into the template and fold.")
+_stage("fold", "Find the folding path of the best tree on the lattice.")
+_stage("join", "Cut the printed bodies with their hinges, and certify the path on them.")
+_stage("check", "Check the printed bodies and replay the folding.")
+_stage("export", "Make the whole kit: 3MF, STEP, STL, animation and report.")
+
+
+@app.command("list")
+@_guarded
+def list_things(
+    what: Annotated[str, typer.Argument(help="samples, templates or profiles.")],
+) -> None:
+    """List the built-in samples, templates or profiles."""
+    from fabfold.cli.console import show_list
+
+    show_list(what)
+
+
+@app.command()
+@_guarded
+def coupon(
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Ends in .3mf, .step or .stl.")
+    ] = Path("coupon.3mf"),
+    profile: ProfileName = None,
+    clearances: Annotated[
+        str | None,
+        typer.Option("--clearances", help="In mm, such as 0.2,0.3,0.4. Default: 0.15 to 0.50."),
+    ] = None,
+) -> None:
+    """Make a tolerance coupon: hinges at several clearances, and how to read them."""
+    from fabfold.printing.profile_coupon import make_coupon
+
+    for path in make_coupon(output, profile, clearances):
+        typer.echo(path)
+
+
+@app.command()
+@_guarded
+def calibrate(
+    turns_freely: Annotated[
+        float,
+        typer.Option(
+            "--turns-freely", help="Smallest clearance on the coupon whose hinge turns freely, mm."
+        ),
+    ],
+    profile: ProfileName = None,
+    fuses: Annotated[
+        float | None,
+        typer.Option("--fuses", help="Largest clearance on the coupon whose hinge is fused, mm."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="The new profile. Default: my-PROFILE.toml."),
+    ] = None,
+) -> None:
+    """Write your own printer profile from a printed coupon; 'export --profile FILE' uses it."""
+    from fabfold.printing.calibrate import calibrate as calibrated
+    from fabfold.printing.calibrate import write_profile
+    from fabfold.printing.profiles import DEFAULT_PROFILE, load_profile
+
+    name = "" if output is None else output.stem
+    mine = calibrated(
+        load_profile(profile or DEFAULT_PROFILE), turns_freely, fuses_mm=fuses, name=name
+    )
+    path = output or Path(f"{mine.name}.toml")
+    write_profile(path, mine)
+    typer.echo(f"{path}: clearance {mine.clearance_mm:g} mm; use it with --profile {path}")
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"fabfold {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit with 0, 1, 2, 3 or 130 (see ``fabfold.errors``)."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    app(args=arguments)

@@ -1,0 +1,214 @@
+"""What the command line shows: progress while a stage runs, and its result."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as RichProgress
+from rich.table import Table
+
+from fabfold.errors import RecipeError
+from fabfold.progress import Progress
+
+if TYPE_CHECKING:
+    from fabfold.kit.kit import Kit
+
+__all__ = ["ConsoleListener", "show_list", "show_result"]
+
+_TITLES = {
+    "solid": "Reading the model",
+    "voxelize": "Cutting voxels",
+    "fit": "Finding trees that fold",
+    "pareto": "Finding the Pareto list",
+    "pictures": "Drawing the solutions",
+    "fold": "Certifying the path",
+    "join": "Making bodies and hinges",
+    "check": "Checking",
+    "export": "Writing the kit",
+}
+
+
+class ConsoleListener:
+    """Shows a bar a stage on a terminal, and a line a stage elsewhere; stages may be nested."""
+
+    def __init__(self) -> None:
+        self._console = Console(stderr=True)
+        self._bars: RichProgress | None = None
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Progress]:
+        """Show the progress of one stage while the context is open."""
+        base, _, number = name.partition("-")
+        title = _TITLES.get(base, base) + (f", round {int(number) + 1}" if number else "")
+        if not self._console.is_terminal:
+            plain = _LastMessage()
+            start = time.monotonic()
+            try:
+                yield plain
+            finally:  # What was reached is worth telling, also where the stage is stopped.
+                seconds = time.monotonic() - start
+                self._console.print(
+                    f"{title:32} {seconds:6.1f} s  {plain.message}", highlight=False, soft_wrap=True
+                )
+        elif self._bars is not None:
+            with _bar(self._bars, title) as bar:
+                yield bar
+        else:
+            columns = (
+                TextColumn("{task.fields[title]:32}"),
+                BarColumn(bar_width=20),
+                TimeElapsedColumn(),
+                TextColumn("{task.description}", markup=False),
+            )
+            try:
+                with (
+                    RichProgress(*columns, console=self._console) as self._bars,
+                    _bar(self._bars, title) as bar,
+                ):
+                    yield bar
+            finally:
+                self._bars = None
+
+
+@contextmanager
+def _bar(bars: RichProgress, title: str) -> Iterator[_LiveBar]:
+    bar = _LiveBar(bars, title)
+    yield bar
+    bar.done()
+
+
+class _LiveBar:
+    def __init__(self, bar: RichProgress, title: str) -> None:
+        self._bar = bar
+        self._task = bar.add_task("", title=title, total=None)
+
+    def update(self, share: float | None, message: str = "") -> None:
+        if share is None:
+            self._bar.update(self._task, description=message)
+        else:
+            self._bar.update(self._task, total=1.0, completed=share, description=message)
+
+    def done(self) -> None:
+        self._bar.update(self._task, total=1.0, completed=1.0)
+
+
+class _LastMessage:
+    message = ""
+
+    def update(self, share: float | None, message: str = "") -> None:
+        if message:
+            self.message = message
+
+
+def show_result(kit: Kit, stage: str) -> None:
+    """Print what `stage` found, and where its files are."""
+    console = Console(highlight=False, soft_wrap=True)
+    for line in _result_lines(kit, stage):
+        console.print(line, markup=False)
+
+
+def _result_lines(kit: Kit, stage: str) -> list[str]:
+    lines = [f"note: {note}" for note in kit.solid().notes]
+    if stage == "voxelize":
+        template = kit.template
+        even, odd = template.colours
+        lines.append(
+            f"template {template.name}: {len(template)} cells in "
+            f"{' x '.join(map(str, template.shape))}, {even} + {odd} by checkerboard colour"
+            + (f", {len(template.creases)} more folds" if template.creases else "")
+        )
+        for index, voxels in enumerate(kit.voxelize()):
+            lines.append(
+                f"voxelization {index}: {len(voxels)} voxels, {voxels.fill.mean():.0%} full, "
+                f"smallest {voxels.fill.min():.0%}, {voxels.lost_volume:.1%} of the volume lost"
+            )
+        return lines
+    made = None if stage in ("fit", "fold") else kit.join()
+    attempt = kit.fold() if made is None else made.attempt
+    tree, motion = attempt.tree, attempt.motion
+    joinery = None if made is None else made.joinery
+    lines.append(
+        f"{len(tree.source)} voxels in {len(tree.bodies)} bodies, {len(tree.hinges)} hinges, "
+        f"folding into {tree.template.name} in {len(motion.moves) - 1} moves"
+    )
+    lines += [str(entry["text"]) for entry in kit.wish_report(attempt, joinery)]
+    if motion.certificate:
+        lines.append(f"smallest gap on the whole path {motion.certificate['min_gap_mm']:.3f} mm")
+    if stage in ("check", "export"):
+        checks = kit.check()
+        bad = [check for check in checks if not check.ok]
+        lines += [
+            f"FAILED {check.name}: {check.figure:g} {check.unit} "
+            f"(limit {check.limit:g}): {check.note}"
+            for check in bad
+        ]
+        lines.append(f"{len(checks) - len(bad)} of {len(checks)} checks passed")
+    if kit.folder is not None:
+        lines.append(f"kit: {kit.folder}")
+    return lines
+
+
+def show_pareto(kit: Kit) -> None:
+    """Print the Pareto list of a kit as a table, and where its pictures are."""
+    console = Console(highlight=False, soft_wrap=True)
+    found = kit.pareto()
+    table = Table("pick", "joints", "surface", "bodies", "moves", "preference", box=None)
+    kept = any(solution.kept is not None for solution in found)
+    if kept:
+        table.add_column("kept")
+    for number, solution in enumerate(found, start=1):
+        tree = solution.candidate.tree
+        row = [
+            str(number),
+            str(solution.joints),
+            f"{solution.surface:.2f}",
+            str(len(tree.bodies)),
+            str(len(solution.candidate.path)),
+            f"{solution.prefer:g}",
+        ]
+        table.add_row(*row, *([f"{solution.kept:.0%}"] if solution.kept is not None else []))
+    console.print(table)
+    if kit.folder is not None:
+        console.print(f"pictures: {kit.folder}/pareto-1.png and so on", markup=False)
+        console.print(f"fabfold export {kit.folder} --pick 1 goes on with the first", markup=False)
+
+
+def show_list(what: str) -> None:
+    """Print the samples, templates or profiles there are.
+
+    Raises
+    ------
+    RecipeError
+        If `what` is none of the three.
+    """
+    console = Console()
+    if what == "samples":
+        from fabfold.samples.catalogue import sample, sample_names
+
+        table = Table("sample", "template", "what it is", box=None)
+        for known in map(sample, sample_names()):
+            table.add_row(f"sample:{known.name}", known.template, known.title)
+    elif what == "templates":
+        from fabfold.lattice.shipped import describe, load_template, template_names
+
+        table = Table("template", "cells", "what it is", box=None)
+        table.add_row("box-AxBxC", "A × B × C", "a box of any size")
+        for name in template_names():
+            table.add_row(name, str(len(load_template(name))), describe(name))
+    elif what == "profiles":
+        from fabfold.printing.profiles import load_profile, profile_names
+
+        table = Table("profile", "process", "clearance", "what it is", box=None)
+        for name in profile_names():
+            profile = load_profile(name)
+            table.add_row(
+                name, profile.process, f"{profile.clearance_mm:g} mm", profile.description
+            )
+    else:
+        raise RecipeError(f"cannot list {what!r}: there are samples, templates and profiles")
+    console.print(table)

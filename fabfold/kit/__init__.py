@@ -1,0 +1,1 @@
+"""A kit: the stages from a model to print-ready files."""

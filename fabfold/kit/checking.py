@@ -1,0 +1,154 @@
+"""Everything that is checked before a kit is written: bodies, certificate, samples and replay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fabfold.kit.stages import Made
+from fabfold.printing.checks import Check, check_bodies
+from fabfold.printing.profiles import Profile
+from fabfold.progress import Progress
+from fabfold.proof.replay import replay
+from fabfold.proof.sampled import sample_path
+from fabfold.tree.kinematics_check import check_tree
+
+__all__ = ["run_checks"]
+
+#: Largest error of a hinge's angle at a keyframe of the replay, degrees.
+ANGLE_LIMIT_DEG = 1.0
+#: Degrees between poses that are searched for collisions, and at which the gap is measured.
+STEP_DEG = 1.0
+GAP_STEP_DEG = 10.0
+#: Most of the kit's volume that may be carved away so that cells pass each other, per cent.
+CARVED_LIMIT = 5.0
+#: Volume that bodies may share in A or B before it is more than rounding, mm³.
+_OVERLAP_MM3 = 1e-3
+
+
+def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
+    """Check the tree, the certificate, the printed bodies, samples of the path and the replay.
+
+    Parameters
+    ----------
+    made : Made
+    profile : Profile
+        Limits of the printer and material.
+    progress : Progress
+
+    Returns
+    -------
+    list of Check
+        Each with its figure, limit, unit and verdict.
+    """
+    tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
+    faults = check_tree(tree)
+    certificate = motion.certificate
+    checks = [
+        Check(
+            name="tree folds the model into the template",
+            figure=float(len(faults)),
+            limit=0.0,
+            unit="faults",
+            ok=not faults,
+            note="; ".join(faults) or "forward kinematics puts every voxel into its cell",
+        ),
+        Check(
+            name="smallest gap on the folding path",
+            figure=float(certificate["min_gap_mm"]),
+            limit=profile.min_gap_mm,
+            unit="mm",
+            ok=certificate["min_gap_mm"] >= profile.min_gap_mm,
+            note=str(certificate["geometry"]),
+        ),
+        Check(
+            name="end of the path is the box",
+            figure=float(certificate["end_pose_error"]),
+            limit=1e-6,
+            unit="voxels",
+            ok=certificate["end_pose_error"] <= 1e-6,
+            note="largest distance of a voxel from its cell after the last move",
+        ),
+    ]
+    if joinery.rounded_cells:
+        checks.append(_rounded(made))
+    progress.update(0.1, "printability")
+    checks += check_bodies(joinery, tree, motion, profile, progress)
+    progress.update(0.5, "every degree of the path")
+    checks += _sampled(made, profile)
+    progress.update(0.8, "replay in MuJoCo")
+    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
+    report = replay(tree, motion, meshes, voxel_mm=joinery.voxel_mm, origin_mm=joinery.origin_mm)
+    checks += [
+        Check(
+            name="replay: deepest penetration",
+            figure=report.max_penetration_mm,
+            limit=joinery.clearance_mm,
+            unit="mm",
+            ok=report.max_penetration_mm <= joinery.clearance_mm,
+            note="bodies pushed by motors through the whole path in MuJoCo",
+        ),
+        Check(
+            name="replay: largest angle error",
+            figure=report.max_angle_error_deg,
+            limit=ANGLE_LIMIT_DEG,
+            unit="deg",
+            ok=bool(np.isfinite(report.max_angle_error_deg))
+            and report.max_angle_error_deg <= ANGLE_LIMIT_DEG,
+            note="at the end of any move",
+        ),
+    ]
+    return checks
+
+
+def _rounded(made: Made) -> Check:
+    """How much was carved so that cells pass each other."""
+    joinery = made.joinery
+    lost = joinery.rounded_skin_mm3 + joinery.rounded_inside_mm3
+    share = 100.0 * lost / (lost + sum(body.volume for body in joinery.bodies))
+    return Check(
+        name="corners rounded off so that cells pass",
+        figure=round(share, 2),
+        limit=CARVED_LIMIT,
+        unit="% of the volume",
+        ok=share <= CARVED_LIMIT,
+        note=f"{joinery.rounded_cells} cells, {joinery.rounded_skin_mm3:.0f} mm³ at the model's "
+        f"surface, {joinery.rounded_inside_mm3:.0f} mm³ inside",
+    )
+
+
+def _sampled(made: Made, profile: Profile) -> list[Check]:
+    """The second opinion on the path, by another library."""
+    tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
+    seen = sample_path(
+        tree.to_json(joinery.voxel_mm, joinery.origin_mm),
+        motion.to_json(),
+        {body.name: (body.vertices, body.faces) for body in joinery.bodies},
+        step_deg=STEP_DEG,
+        gap_step_deg=GAP_STEP_DEG,
+    )
+    clean = not seen.hits and seen.overlap_mm3 <= _OVERLAP_MM3
+    return [
+        Check(
+            name=f"moves with a collision, a look every {STEP_DEG:g}°",
+            figure=float(len(seen.hits)),
+            limit=0.0,
+            unit="moves",
+            ok=clean,
+            note=(
+                "; ".join(seen.hits[:3])
+                or (
+                    f"{seen.poses} poses, looked at by another library than the proof's (FCL)"
+                    if clean
+                    else f"bodies share {seen.overlap_mm3:.3f} mm³ in shape A or in the box"
+                )
+            ),
+        ),
+        Check(
+            name=f"smallest gap seen on the folding path, every {GAP_STEP_DEG:g}°",
+            figure=round(seen.least_mm, 4),
+            limit=profile.min_gap_mm,
+            unit="mm",
+            ok=seen.least_mm >= profile.min_gap_mm,
+            note=seen.where,
+        ),
+    ]

@@ -1,0 +1,482 @@
+"""A kit: the stages from a model to print-ready files, in memory or in a folder.
+
+Data flows one way, solid → voxels → candidates → motion → joinery → report → files. Each stage is
+a method of :class:`Kit` that runs what is missing before it and returns a typed result. With a
+folder, every finished stage is kept there, and the same recipe goes on from what is done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from fabfold.errors import CheckError, GeometryError, KitError, NoFoldError, RecipeError
+from fabfold.files import write_text
+from fabfold.kit import keys
+from fabfold.kit.stages import Attempt, Made, build
+from fabfold.lattice.rotations import rotation_of_degrees
+from fabfold.lattice.template import Template
+from fabfold.progress import Listener, Progress, SilentListener
+from fabfold.recipe.recipe import Recipe
+from fabfold.recipe.start import check_free, start_of
+from fabfold.recipe.targets import load_target
+from fabfold.store import StageStore
+
+if TYPE_CHECKING:
+    from fabfold.joinery.bodies import Joinery
+    from fabfold.printing.checks import Check
+    from fabfold.printing.profiles import Profile
+    from fabfold.search.pareto import Solution
+    from fabfold.search.rounds import Rounds
+    from fabfold.solid.closed_solid import Solid
+    from fabfold.tree.solve import Candidate
+    from fabfold.voxels.voxel_model import Voxels
+    from fabfold.wishes.terms import Wishes
+
+__all__ = ["Kit", "open_kit"]
+
+Result = TypeVar("Result")
+
+
+class Kit:
+    """One model on its way to a printed, folding object.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        Every choice that the result depends on.
+    model : Path or None
+        The model's file; None for a sample.
+    template : Path or None
+        The template's file; None for a box or a shipped template.
+    folder : Path or None
+        Kit folder that keeps finished stages; None works in memory until :meth:`export`.
+    workers : int or None
+        Processes of the search; None takes one a core. Changes no result.
+    scheduler : str or None
+        Address of a Dask scheduler, whose workers search instead. Changes no result.
+    seconds : float or None
+        Search for so long and take the best that was found; depends on the machine's speed.
+
+    Examples
+    --------
+    >>> from fabfold.kit.kit import Kit
+    >>> kit = Kit.from_model("sample:car", seed=1)
+    >>> kit.recipe.template
+    'box-3x4x4'
+    """
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        *,
+        model: Path | None = None,
+        template: Path | None = None,
+        folder: Path | None = None,
+        workers: int | None = None,
+        scheduler: str | None = None,
+        seconds: float | None = None,
+    ) -> None:
+        if workers is not None and workers < 1:
+            raise RecipeError(f"--workers {workers}: there must be at least one")
+        if seconds is not None and not seconds >= 0:
+            raise RecipeError(f"--time {seconds}: must be a number of seconds, 0 or more")
+        if scheduler is not None:
+            from fabfold.search.dask import check_address
+
+            check_address(scheduler)
+        self.recipe = recipe
+        self.folder = folder
+        self.workers = workers
+        self.scheduler = scheduler
+        self.seconds = seconds
+        self.listener: Listener = SilentListener()
+        self._model = model
+        self._store = StageStore(folder)
+        self._results: dict[str, Any] = {}
+        self._template_file = template
+        self._template: Template = load_target(recipe.template, template, recipe.template_cells)
+        if recipe.joints_inside:
+            self._template = replace(self._template, joints="inside")
+        if folder is not None:
+            check_free(folder)
+
+    @classmethod
+    def from_model(
+        cls,
+        model: str | Path,
+        *,
+        folder: str | Path | None = None,
+        workers: int | None = None,
+        scheduler: str | None = None,
+        seconds: float | None = None,
+        **options: Any,
+    ) -> Kit:
+        """Kit of a model file or ``sample:NAME``; `options` are the fields of the recipe.
+
+        Raises
+        ------
+        ModelError
+            If there is no such file or sample.
+        RecipeError
+            If an option is wrong.
+        """
+        return open_kit(
+            str(model),
+            folder=None if folder is None else Path(folder),
+            workers=workers,
+            scheduler=scheduler,
+            seconds=seconds,
+            **options,
+        )
+
+    @property
+    def template(self) -> Template:
+        """The target shape, as it is filled (before any folds of its own)."""
+        return self._template
+
+    # Stages -----------------------------------------------------------------------------------
+
+    def solid(self) -> Solid:
+        """Closed manifold of the model (repaired where it could be)."""
+        from fabfold.kit.stage_files import load_solid, save_solid
+        from fabfold.samples.catalogue import load_model
+
+        def make(progress: Progress) -> Solid:
+            progress.update(None, self.recipe.model)
+            source: str | Path = self.recipe.model
+            if self._model is not None:
+                source = self._store.keep(self._model, self.recipe.sha256, "model")
+            solid = load_model(source)
+            progress.update(1.0, f"{len(solid.faces)} triangles")
+            return solid
+
+        return self._stage("solid", keys.solid_key(self.recipe), make, save_solid, load_solid)
+
+    def voxelize(self) -> list[Voxels]:
+        """Voxelizations of the model, best first (paper section 3)."""
+        from fabfold.kit.stage_files import load_options, save_options
+        from fabfold.voxels.voxelize import voxelize
+
+        recipe = self.recipe
+        solid = self.solid()
+        regions = self.wishes().regions
+
+        def make(progress: Progress) -> list[Voxels]:
+            found = voxelize(
+                solid,
+                self._template,
+                seed=recipe.seed,
+                rotation=None if recipe.rotation is None else rotation_of_degrees(recipe.rotation),
+                origin=recipe.origin,
+                pitch=recipe.pitch,
+                drop_below=recipe.drop_below,
+                regions=regions,
+                progress=progress,
+            )
+            progress.update(1.0, f"{len(found[0])} voxels")
+            return found
+
+        key = keys.voxels_key(recipe, self._template)
+        return self._stage("voxelize", key, make, save_options, load_options)
+
+    def fit(self) -> list[Candidate]:
+        """Trees that fold, best first (paper section 4), of the first round that finds any.
+
+        With a budget in seconds, the best of all rounds that there is time for.
+
+        Raises
+        ------
+        NoTreeError, NoFoldError
+            If no round of the recipe finds one.
+        """
+        if self.recipe.pick:
+            return [self._picked().candidate]
+        return [candidate for _, candidate in next(self._rounds().found())]
+
+    def fold(self) -> Attempt:
+        """Best tree with its folding path, planned on the lattice (paper section 5)."""
+        result = self._results.get("fold")
+        if result is None:
+            result = next(self._attempts())
+            self._results["fold"] = result
+        return result
+
+    def join(self) -> Made:
+        """Printed bodies of the best tree that survives on them, with the final certificate.
+
+        Raises
+        ------
+        NoFoldError
+            If every tree of every round was refused; it says why.
+        """
+        from fabfold.kit.stage_files import load_made, save_made
+
+        profile = self.profile()
+        self.fit()
+
+        def make(progress: Progress) -> Made:
+            refused: list[str] = []
+            for attempt in self._attempts():
+                try:
+                    return self._build(attempt, profile, tuple(refused), progress)
+                except (GeometryError, CheckError) as error:
+                    refused.append(str(error))
+                    progress.update(None, f"tree {len(refused)} refused: {error}")
+            raise NoFoldError(
+                f"none of the {len(refused)} trees that fold as cubes could be built; "
+                f"the last one: {refused[-1]}. Try another --seed, a larger --voxel-mm or a "
+                "smaller --clearance-mm"
+            )
+
+        key = keys.join_key(self.recipe, self._template, profile, self._mark())
+        return self._stage("join", key, make, save_made, load_made)
+
+    def check(self) -> list[Check]:
+        """Checks of the printed bodies and the replay of the path, each with figure and limit."""
+        from fabfold.kit.checking import run_checks
+        from fabfold.kit.stage_files import load_checks, save_checks
+
+        profile = self.profile()
+        made = self.join()
+
+        def make(progress: Progress) -> list[Check]:
+            checks = run_checks(made, profile, progress)
+            bad = [check for check in checks if not check.ok]
+            progress.update(1.0, f"{len(checks) - len(bad)} of {len(checks)} passed")
+            return checks
+
+        key = keys.check_key(self.recipe, self._template, profile, self._mark())
+        return self._stage("check", key, make, save_checks, load_checks)
+
+    def export(self, folder: str | Path | None = None) -> Path:
+        """Write the files of the kit and return their folder.
+
+        Parameters
+        ----------
+        folder : path or None
+            Where to write; None is the kit's own folder.
+
+        Raises
+        ------
+        KitError
+            If there is no folder to write to, or it holds something else.
+        """
+        from fabfold.kit.writing import write_kit
+
+        target = self.folder if folder is None else Path(folder)
+        if target is None:
+            raise KitError("where to? Give a folder to export to")
+        check_free(target)
+        profile = self.profile()
+        made = self.join()
+        checks = self.check()
+        with self.listener.stage("export") as progress:
+            write_kit(
+                target, self.recipe, profile, self.solid(), made, checks, progress,
+                self.wish_report(made.attempt, made.joinery), self._template,
+            )  # fmt: skip
+        if target != self.folder:
+            if self._model is not None:
+                StageStore(target).keep(self._model, self.recipe.sha256, "model")
+            self._keep_template(StageStore(target))
+        return target
+
+    def run(self, stage: str) -> None:
+        """Run one stage by name, with all before it that is missing, and write its kit files."""
+        result = getattr(self, stage)()
+        if self.folder is None or stage in ("solid", "voxelize", "export"):
+            return
+        from fabfold.kit import writing
+
+        if stage == "fit":
+            result = self.fold()
+        if isinstance(result, Attempt):
+            writing.write_attempt(self.folder, result, self.recipe.voxel_mm)
+            return
+        made = self.join()
+        writing.write_made(self.folder, made)
+        if stage == "check":
+            wishes = self.wish_report(made.attempt, made.joinery)
+            writing.write_checks(self.folder, self.solid(), made, result, wishes)
+
+    # How the stages hang together ---------------------------------------------------------------
+
+    def profile(self) -> Profile:
+        """Printer profile, with the recipe's clearance where it gives one."""
+        from fabfold.printing.profiles import load_profile
+
+        profile = load_profile(self.recipe.profile)
+        if self.recipe.clearance_mm is not None:
+            profile = profile.model_copy(update={"clearance_mm": self.recipe.clearance_mm})
+        return profile
+
+    def _keep_template(self, store: StageStore) -> None:
+        if self._template_file is not None:
+            store.keep(self._template_file, self.recipe.template_sha256, "template")
+
+    def _rounds(self) -> Rounds:
+        if "rounds" not in self._results:
+            self._results["rounds"] = self._rounds_of(self.recipe, seconds=self.seconds)
+        result: Rounds = self._results["rounds"]
+        return result
+
+    def _rounds_of(self, recipe: Recipe, shift: int = 0, seconds: float | None = None) -> Rounds:
+        """Search of the kit's voxelizations for its recipe, or one with another preference."""
+        from fabfold.search.rounds import Rounds
+
+        return Rounds(
+            recipe,
+            self._template,
+            self.voxelize(),
+            key=keys.voxels_key(self.recipe, self._template),
+            store=self._store,
+            workers=self.workers,
+            listening=self._listening,
+            scheduler=self.scheduler,
+            seconds=seconds,
+            wishes=self.wishes(),
+            shift=shift,
+        )
+
+    def _mark(self) -> list[Any]:
+        return [] if self.recipe.pick else self._rounds().mark()
+
+    def wishes(self) -> Wishes:
+        """The wishes of the recipe, sampled on the model."""
+        from fabfold.recipe.recipe_wishes import make_wishes
+
+        if "wishes" not in self._results:
+            self._results["wishes"] = make_wishes(self.recipe, self.solid())
+        result: Wishes = self._results["wishes"]
+        return result
+
+    def wish_report(self, attempt: Attempt, joinery: Joinery | None = None) -> list[dict[str, Any]]:
+        """What became of each wish in a tree and its bodies: figures and a line of text."""
+        from fabfold.kit.wish_report import wish_report
+
+        return wish_report(self.wishes(), attempt, joinery)
+
+    def pareto(self) -> list[Solution]:
+        """Trees that fold of which none is better than another in every respect.
+
+        They are numbered from 1, fewest joints first; the recipe's `pick` goes on with one of them.
+
+        Raises
+        ------
+        NoTreeError, NoFoldError
+            If no round of the recipe finds a tree that folds.
+        """
+        from fabfold.search.pareto import solutions
+
+        if "pareto" not in self._results:
+            self._results["pareto"] = solutions(
+                self.recipe, self._rounds_of, self._listening, self.workers, self.scheduler
+            )
+        result: list[Solution] = self._results["pareto"]
+        return result
+
+    def list_pareto(self) -> None:
+        """Write ``pareto.json`` and a picture of each solution of the Pareto list."""
+        from fabfold.kit.writing import write_pareto
+
+        found = self.pareto()
+        if self.folder is not None:
+            with self.listener.stage("pictures") as progress:
+                write_pareto(self.folder, found, progress)
+
+    def _picked(self) -> Solution:
+        from fabfold.search.pareto import picked
+
+        return picked(self.pareto(), self.recipe.pick)
+
+    def _attempts(self) -> Iterator[Attempt]:
+        """Every candidate of every round, best first, with its lattice path as a motion."""
+        from fabfold.fold.motion import motion_of
+
+        if self.recipe.pick:
+            picked = self._picked()
+            tree, path = picked.candidate.tree, picked.candidate.path
+            yield Attempt(picked.voxels, tree, motion_of(tree, path))
+            return
+        for pairs in self._rounds().found():
+            for voxels, candidate in pairs:
+                yield Attempt(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
+
+    def _build(
+        self, attempt: Attempt, profile: Profile, refused: tuple[str, ...], progress: Progress
+    ) -> Made:
+        return build(attempt, profile, self.recipe.voxel_mm, refused, progress)
+
+    def _listening(self, name: str) -> AbstractContextManager[Progress]:
+        """Progress of a stage that is about to be made; the recipe is written before the first."""
+        if self.folder is not None:
+            write_text(self.folder / "kit.toml", self.recipe.to_toml())
+            self._keep_template(self._store)
+        return self.listener.stage(name)
+
+    def _stage(
+        self,
+        name: str,
+        key: str,
+        make: Callable[[Progress], Result],
+        save: Callable[[StageStore, Result], list[str]],
+        load: Callable[[StageStore, list[str]], Result],
+    ) -> Result:
+        """Result of a stage: from memory, from the kit folder, or made now and kept."""
+        if name in self._results:
+            result: Result = self._results[name]
+            return result
+        if self._store.holds(name, key):
+            result = load(self._store, self._store.files(name))
+        else:
+            with self._listening(name) as progress:
+                result = make(progress)
+            if self._store.folder is not None:
+                self._store.record(name, key, save(self._store, result))
+        self._results[name] = result
+        return result
+
+
+def open_kit(
+    source: str,
+    *,
+    folder: Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    seconds: float | None = None,
+    **options: Any,
+) -> Kit:
+    """Kit of a model file, ``sample:NAME``, a ``kit.toml`` or a kit folder.
+
+    Parameters
+    ----------
+    source : str
+    folder : Path or None
+        Kit folder; for a kit folder or its ``kit.toml`` the default is that folder.
+    workers : int or None
+    scheduler : str or None
+    seconds : float or None
+    **options
+        Fields of the recipe; those that are None keep the recipe's or the default value.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file or sample.
+    RecipeError
+        If the recipe or an option is wrong.
+    """
+    start = start_of(source, folder, options)
+    return Kit(
+        start.recipe,
+        model=start.model,
+        template=start.template,
+        folder=start.folder,
+        workers=workers,
+        scheduler=scheduler,
+        seconds=seconds,
+    )

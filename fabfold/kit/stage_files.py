@@ -1,0 +1,133 @@
+"""Results of the stages as files of the stage store; reading gives back what was written."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+import numpy as np
+
+from fabfold.files import write_json, write_npz
+from fabfold.fold.motion import Motion
+from fabfold.joinery.bodies import BodyMesh, Joinery
+from fabfold.kit.stages import Attempt, Made
+from fabfold.printing.checks import Check
+from fabfold.solid.closed_solid import Paint, Solid
+from fabfold.store import StageStore
+from fabfold.tree.fold_tree import FoldTree
+from fabfold.voxels.voxel_files import load_voxels, save_voxels
+from fabfold.voxels.voxel_model import Voxels
+
+__all__ = [
+    "load_checks",
+    "load_made",
+    "load_options",
+    "load_solid",
+    "save_checks",
+    "save_made",
+    "save_options",
+    "save_solid",
+]
+
+
+def save_solid(store: StageStore, solid: Solid) -> list[str]:
+    """Write a solid."""
+    write_npz(
+        store.path("solid.npz"),
+        {
+            "vertices": solid.vertices,
+            "faces": solid.faces,
+            "about": np.array([solid.name, solid.sha256, *solid.notes]),
+            **(
+                {}
+                if solid.paint is None
+                else {"paint": solid.paint.corners, "colours": solid.paint.colours}
+            ),
+        },
+    )
+    return ["solid.npz"]
+
+
+def load_solid(store: StageStore, files: list[str]) -> Solid:
+    """Read what :func:`save_solid` wrote."""
+    with np.load(store.path(files[0]), allow_pickle=False) as data:
+        name, digest, *notes = (str(text) for text in data["about"])
+        paint = Paint(data["paint"], data["colours"]) if "paint" in data.files else None
+        return Solid(name, data["vertices"], data["faces"], tuple(notes), digest, paint)
+
+
+def save_options(store: StageStore, options: list[Voxels]) -> list[str]:
+    """Write voxelizations, best first."""
+    names = [f"voxels-{index:02d}.npz" for index in range(len(options))]
+    for name, voxels in zip(names, options, strict=True):
+        save_voxels(store.path(name), voxels)
+    return names
+
+
+def load_options(store: StageStore, files: list[str]) -> list[Voxels]:
+    """Read what :func:`save_options` wrote."""
+    return [load_voxels(store.path(name)) for name in files]
+
+
+def save_made(store: StageStore, made: Made) -> list[str]:
+    """Write the tree that was built, its motion and its bodies."""
+    tree, joinery = made.attempt.tree, made.joinery
+    content = {
+        "format": "fabfold-made",
+        "version": 1,
+        "tree": tree.to_json(joinery.voxel_mm, joinery.origin_mm),
+        "motion": made.attempt.motion.to_json(),
+        "refused": list(made.refused),
+    }
+    write_json(store.path("made.json"), content)
+    save_voxels(store.path("made-voxels.npz"), made.attempt.voxels)
+    about: dict[str, Any] = {
+        field.name: getattr(joinery, field.name)
+        for field in dataclasses.fields(joinery)
+        if field.name != "bodies"
+    }
+    arrays = {"about": np.array([json.dumps(about)])}
+    for index, body in enumerate(joinery.bodies):
+        arrays[f"name_{index}"] = np.array([body.name])
+        arrays[f"vertices_{index}"] = body.vertices
+        arrays[f"faces_{index}"] = body.faces
+    write_npz(store.path("made-bodies.npz"), arrays)
+    return ["made.json", "made-voxels.npz", "made-bodies.npz"]
+
+
+def load_made(store: StageStore, files: list[str]) -> Made:
+    """Read what :func:`save_made` wrote."""
+    data = json.loads(store.path("made.json").read_text(encoding="utf-8"))
+    attempt = Attempt(
+        load_voxels(store.path("made-voxels.npz")),
+        FoldTree.from_json(data["tree"]),
+        Motion.from_json(data["motion"]),
+    )
+    with np.load(store.path("made-bodies.npz"), allow_pickle=False) as arrays:
+        about = json.loads(str(arrays["about"][0]))
+        about["origin_mm"] = tuple(about["origin_mm"])
+        about["notes"] = tuple(about["notes"])
+        count = sum(key.startswith("name_") for key in arrays.files)
+        bodies = tuple(
+            BodyMesh(str(arrays[f"name_{i}"][0]), arrays[f"vertices_{i}"], arrays[f"faces_{i}"])
+            for i in range(count)
+        )
+    return Made(attempt, Joinery(bodies=bodies, **about), tuple(data["refused"]))
+
+
+def save_checks(store: StageStore, checks: list[Check]) -> list[str]:
+    """Write checks."""
+    content = {
+        "format": "fabfold-checks",
+        "version": 1,
+        "checks": [dataclasses.asdict(check) for check in checks],
+    }
+    write_json(store.path("checks.json"), content)
+    return ["checks.json"]
+
+
+def load_checks(store: StageStore, files: list[str]) -> list[Check]:
+    """Read what :func:`save_checks` wrote."""
+    data = json.loads(store.path(files[0]).read_text(encoding="utf-8"))
+    return [Check(**entry) for entry in data["checks"]]

@@ -1,0 +1,96 @@
+"""A tree on its way to being built: what the fold and join stages return, and the way between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from fabfold.fold.motion import Motion
+from fabfold.joinery.bodies import Joinery
+from fabfold.progress import Progress
+from fabfold.tree.fold_tree import FoldTree
+from fabfold.voxels.voxel_model import Voxels
+
+if TYPE_CHECKING:
+    from fabfold.printing.profiles import Profile
+
+__all__ = ["Attempt", "Made", "build"]
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A tree with its path on the lattice: what the fold stage returns."""
+
+    voxels: Voxels
+    tree: FoldTree
+    motion: Motion
+
+
+@dataclass(frozen=True)
+class Made:
+    """A tree that was built and certified: what the join stage returns.
+
+    Attributes
+    ----------
+    attempt : Attempt
+        Voxels, tree, and the motion with its certificate on the real bodies.
+    joinery : Joinery
+        The printed bodies.
+    refused : tuple of str
+        Why each better-ranked tree was passed over.
+    """
+
+    attempt: Attempt
+    joinery: Joinery
+    refused: tuple[str, ...]
+
+
+def build(
+    attempt: Attempt,
+    profile: Profile,
+    voxel_mm: float,
+    refused: tuple[str, ...],
+    progress: Progress,
+) -> Made:
+    """Make the bodies of a tree, and certify its path on them.
+
+    Parameters
+    ----------
+    attempt : Attempt
+    profile : Profile
+        Clearance of the hinges, and the gap to certify.
+    voxel_mm : float
+        Printed side of a voxel.
+    refused : tuple of str
+        Why each better-ranked tree was passed over.
+    progress : Progress
+
+    Raises
+    ------
+    GeometryError
+        If this tree cannot be built.
+    CheckError
+        If its bodies come too near to each other on the path.
+    """
+    from fabfold.joinery.build import build_bodies
+    from fabfold.proof.certify import certify
+
+    joinery = build_bodies(
+        attempt.voxels,
+        attempt.tree,
+        attempt.motion,
+        voxel_mm=voxel_mm,
+        clearance_mm=profile.clearance_mm,
+        progress=progress,
+    )
+    certificate = certify(
+        attempt.tree,
+        attempt.motion,
+        [(body.vertices, body.faces) for body in joinery.bodies],
+        voxel_mm=joinery.voxel_mm,
+        origin_mm=joinery.origin_mm,
+        min_gap_mm=profile.min_gap_mm,
+        progress=progress,
+    )
+    motion = replace(attempt.motion, certificate=certificate)
+    return Made(replace(attempt, motion=motion), joinery, refused)

@@ -1,0 +1,178 @@
+"""Write the files of a kit, each whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from fabfold.export.colours import body_colours
+from fabfold.export.flat import flat_poses
+from fabfold.export.glb import write_glb
+from fabfold.export.picture import png_bytes, write_strip
+from fabfold.export.report import write_report
+from fabfold.export.sketch import picture_of_tree
+from fabfold.export.step import write_step
+from fabfold.export.stl import write_stl
+from fabfold.export.threemf import posed, write_3mf
+from fabfold.files import write_bytes, write_json, write_text
+from fabfold.kit.stages import Attempt, Made
+from fabfold.lattice.template import Template
+from fabfold.printing.checks import Check
+from fabfold.printing.profiles import Profile
+from fabfold.progress import Progress
+from fabfold.recipe.recipe import Recipe
+from fabfold.search.pareto import Solution
+from fabfold.solid.closed_solid import Solid
+from fabfold.version import __version__
+
+__all__ = [
+    "kit_summary",
+    "write_attempt",
+    "write_checks",
+    "write_kit",
+    "write_made",
+    "write_pareto",
+]
+
+
+def kit_summary(solid: Solid, made: Made, wishes: Sequence[dict[str, Any]] = ()) -> dict[str, Any]:
+    """Figures of a kit for its report: counts, volumes, energies (JSON-ready)."""
+    tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
+    voxels = made.attempt.voxels
+    return {
+        "model": solid.name,
+        "repairs": list(solid.notes),
+        "template": tree.template.name,
+        "template_cells": len(tree.template),
+        "voxels": len(tree.source),
+        "mean_fill": round(float(tree.fill.mean()), 4),
+        "lost_volume": round(float(voxels.lost_volume), 5),
+        "bodies": len(tree.bodies),
+        "joints": tree.joints,
+        "energy": {key: round(float(value), 4) for key, value in tree.energy.items()},
+        "voxel_energy": {key: round(float(value), 4) for key, value in voxels.energy.items()},
+        "moves": len(motion.moves) - 1,
+        "voxel_mm": joinery.voxel_mm,
+        "clearance_mm": joinery.clearance_mm,
+        "barrel_radius_mm": joinery.barrel_radius_mm,
+        "carved_cells": joinery.carved_cells,
+        "carved_mm3": round(joinery.carved_mm3, 2),
+        "rounded_cells": joinery.rounded_cells,
+        "rounded_skin_mm3": round(joinery.rounded_skin_mm3, 2),
+        "rounded_inside_mm3": round(joinery.rounded_inside_mm3, 2),
+        "dropped_mm3": round(joinery.dropped_mm3, 2),
+        "struts": joinery.struts,
+        "volume_mm3": round(sum(body.volume for body in joinery.bodies), 1),
+        "notes": list(joinery.notes),
+        "refused_trees": list(made.refused),
+        **({"wishes": list(wishes)} if wishes else {}),
+    }
+
+
+def write_attempt(folder: Path, attempt: Attempt, voxel_mm: float) -> None:
+    """Write ``tree.json`` and ``motion.json`` of a tree that is not built yet."""
+    write_json(folder / "tree.json", attempt.tree.to_json(voxel_mm, (0.0, 0.0, 0.0)))
+    write_json(folder / "motion.json", attempt.motion.to_json())
+
+
+def write_pareto(folder: Path, found: Sequence[Solution], progress: Progress) -> None:
+    """Write ``pareto.json`` and ``pareto-1.png`` ..., one picture for each solution."""
+    for old in sorted(folder.glob("pareto-*.png")):
+        old.unlink()
+    for number, solution in enumerate(found, start=1):
+        image = picture_of_tree(solution.voxels, solution.candidate.tree)
+        write_bytes(folder / f"pareto-{number}.png", png_bytes(image))
+        progress.update(number / len(found), f"{number} of {len(found)}")
+    entries = [solution.to_json(number) for number, solution in enumerate(found, start=1)]
+    content = {"format": "fabfold-pareto", "version": 1, "solutions": entries}
+    write_json(folder / "pareto.json", content)
+
+
+def write_made(folder: Path, made: Made) -> None:
+    """Write ``tree.json``, ``motion.json`` and ``bodies/`` of a tree that was built."""
+    tree, joinery = made.attempt.tree, made.joinery
+    write_json(folder / "tree.json", tree.to_json(joinery.voxel_mm, joinery.origin_mm))
+    write_json(folder / "motion.json", made.attempt.motion.to_json())
+    write_stl(folder / "bodies", joinery)
+
+
+def write_checks(
+    folder: Path,
+    solid: Solid,
+    made: Made,
+    checks: list[Check],
+    wishes: Sequence[dict[str, Any]] = (),
+) -> None:
+    """Write ``report.json`` and ``report.html``; `wishes` tells what became of each wish."""
+    write_report(folder, checks, kit_summary(solid, made, wishes))
+
+
+def write_kit(
+    folder: Path,
+    recipe: Recipe,
+    profile: Profile,
+    solid: Solid,
+    made: Made,
+    checks: list[Check],
+    progress: Progress,
+    wishes: Sequence[dict[str, Any]] = (),
+    template: Template | None = None,
+) -> None:
+    """Write every file of the kit into `folder`.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where it is missing; files of an older export are replaced one by one.
+    recipe : Recipe
+    profile : Profile
+    solid : Solid
+    made : Made
+    checks : list of Check
+    progress : Progress
+    wishes : sequence of dict
+        What became of each wish.
+    template : Template, optional
+        The target as it is filled; one with creases is also written as it lies flat.
+    """
+    tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
+    name = recipe.name
+    colours = body_colours(tree)
+    write_text(folder / "kit.toml", recipe.to_toml())
+    progress.update(0.1, "bodies as STL")
+    write_made(folder, made)
+    progress.update(0.2, "3MF")
+    write_3mf(
+        folder / f"{name}.3mf",
+        joinery,
+        title=f"{name} folds into {tree.template.name}",
+        metadata={
+            "Application": f"fabfold {__version__}",
+            "Description": (
+                f"{len(tree.bodies)} bodies, {len(tree.hinges)} hinges, voxel "
+                f"{joinery.voxel_mm:g} mm, clearance {joinery.clearance_mm:g} mm, "
+                f"profile {profile.name}, seed {recipe.seed}"
+            ),
+        },
+        colours=colours,
+    )
+    flat = None if template is None else flat_poses(joinery, tree, motion, template)
+    if template is not None and flat is not None:
+        write_3mf(
+            folder / f"{name}-flat.3mf",
+            posed(joinery, flat),
+            title=f"{name} laid flat as {template.name}",
+            metadata={"Application": f"fabfold {__version__}"},
+            colours=colours,
+        )
+    progress.update(0.3, "STEP")
+    write_step(folder / f"{name}.step", joinery, tree, title=name, colours=colours)
+    progress.update(0.8, "animation")
+    write_glb(folder / "fold.glb", joinery, tree, motion, title=name, colours=colours)
+    progress.update(0.85, "picture")
+    upright = made.attempt.voxels.rotation.T
+    write_strip(folder / "fold.png", joinery, tree, motion, colours=colours, upright=upright)
+    progress.update(0.95, "report")
+    write_checks(folder, solid, made, checks, wishes)
+    progress.update(1.0, str(folder))

@@ -1,0 +1,1 @@
+"""The cubic lattice: rotations, templates, swept cells."""

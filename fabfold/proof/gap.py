@@ -1,0 +1,477 @@
+"""Proof that triangles keep a gap while one set of them turns about the z axis.
+
+For a pair of pieces (boxes or triangles) and a range of angles, a *lower bound* of their distance
+over all angles in the range comes from any of these, whichever is best:
+
+* quantities that the turn does not change: z, r, (z + r) / √2, (z - r) / √2, or, for a pair of
+  triangles, the combination of z and r that the nearest points suggest;
+* a plane that stands still: the turning piece's coordinate along its normal is a sinusoid of the
+  angle for each corner, so its least value over the range is exact;
+* a plane that turns along: the same with the roles exchanged.
+
+A pair that is not proven is divided: larger boxes into their children, and angles in two.
+For triangles the normals come from the nearest points at the middle of the range, so the bound
+misses the distance only by a second-order term, and few divisions are needed.
+"""
+
+# mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabfold.proof.bvh import Boxes
+
+__all__ = ["DONE", "FAILED", "UNPROVEN", "least_gap", "sweep_pairs", "triangle_distance"]
+
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+
+#: Verdicts of :func:`least_gap`.
+DONE, FAILED, UNPROVEN = 0, 1, 2
+#: Ranges of angles (radians) are not divided below this.
+FINEST = 1e-6
+
+
+@njit(cache=True)
+def _segments(p: F64, u: F64, q: F64, v: F64, out: F64) -> float:
+    """Squared distance of two segments (point, edge vector); `out` gets the two nearest points."""
+    a = u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
+    e = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+    rx = p[0] - q[0]
+    ry = p[1] - q[1]
+    rz = p[2] - q[2]
+    f = v[0] * rx + v[1] * ry + v[2] * rz
+    c = u[0] * rx + u[1] * ry + u[2] * rz
+    b = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    s = 0.0
+    t = 0.0
+    if a <= 0.0 and e <= 0.0:
+        pass
+    elif a <= 0.0:
+        t = min(1.0, max(0.0, f / e))
+    elif e <= 0.0:
+        s = min(1.0, max(0.0, -c / a))
+    else:
+        denominator = a * e - b * b
+        if denominator > 1e-14 * a * e:
+            s = min(1.0, max(0.0, (b * f - c * e) / denominator))
+        t = (b * s + f) / e
+        if t < 0.0:
+            t = 0.0
+            s = min(1.0, max(0.0, -c / a))
+        elif t > 1.0:
+            t = 1.0
+            s = min(1.0, max(0.0, (b - c) / a))
+    total = 0.0
+    for i in range(3):
+        out[0, i] = p[i] + s * u[i]
+        out[1, i] = q[i] + t * v[i]
+        total += (out[0, i] - out[1, i]) ** 2
+    return total
+
+
+@njit(cache=True)
+def _cross(a: F64, b: F64, out: F64) -> None:
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True)
+def _pierces(tri: F64, edge: F64, normal: F64, p: F64, d: F64, out: F64) -> bool:
+    """Whether the segment from p along d goes through a triangle; `out` gets the point."""
+    height = 0.0
+    rise = 0.0
+    for i in range(3):
+        height += normal[i] * (p[i] - tri[0, i])
+        rise += normal[i] * d[i]
+    if rise == 0.0:
+        return False
+    share = -height / rise
+    if share < 0.0 or share > 1.0:
+        return False
+    point = np.empty(3)
+    for i in range(3):
+        point[i] = p[i] + share * d[i]
+    side = np.empty(3)
+    away = np.empty(3)
+    for k in range(3):
+        for i in range(3):
+            away[i] = point[i] - tri[k, i]
+        _cross(edge[k], away, side)
+        if side[0] * normal[0] + side[1] * normal[1] + side[2] * normal[2] < 0.0:
+            return False
+    out[0] = point
+    out[1] = point
+    return True
+
+
+@njit(cache=True)
+def _corner_to_face(
+    tri: F64, edge: F64, normal: F64, square: float, corner: F64, out: F64, which: int
+) -> float:
+    """Squared distance of a corner to a triangle where its foot is inside, else infinity."""
+    height = 0.0
+    for i in range(3):
+        height += normal[i] * (corner[i] - tri[0, i])
+    side = np.empty(3)
+    away = np.empty(3)
+    for k in range(3):
+        for i in range(3):
+            away[i] = corner[i] - tri[k, i]
+        _cross(edge[k], away, side)
+        if side[0] * normal[0] + side[1] * normal[1] + side[2] * normal[2] < 0.0:
+            return np.inf
+    for i in range(3):
+        out[which, i] = corner[i]
+        out[1 - which, i] = corner[i] - height * normal[i] / square
+    return height * height / square
+
+
+@njit(cache=True)
+def triangle_distance(one: F64, two: F64, nearest: F64) -> float:
+    """Distance of two triangles; 0 where they meet.
+
+    Parameters
+    ----------
+    one, two : (3, 3) float64 arrays
+        Corners.
+    nearest : (2, 3) float64 array
+        Gets a nearest point on each.
+    """
+    edge_one = np.empty((3, 3))
+    edge_two = np.empty((3, 3))
+    for k in range(3):
+        for i in range(3):
+            edge_one[k, i] = one[(k + 1) % 3, i] - one[k, i]
+            edge_two[k, i] = two[(k + 1) % 3, i] - two[k, i]
+    points = np.empty((2, 3))
+    best = np.inf
+    for k in range(3):
+        for j in range(3):
+            square = _segments(one[k], edge_one[k], two[j], edge_two[j], points)
+            if square < best:
+                best = square
+                nearest[:] = points
+    normal = np.empty(3)
+    for turn in range(2):
+        tri, edge, corner, stroke = (
+            (two, edge_two, one, edge_one) if turn == 0 else (one, edge_one, two, edge_two)
+        )
+        _cross(edge[0], edge[1], normal)
+        size = normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2
+        if size <= 0.0:
+            continue
+        for k in range(3):
+            square = _corner_to_face(tri, edge, normal, size, corner[k], points, turn)
+            if square < best:
+                best = square
+                nearest[:] = points
+            if best > 0.0 and _pierces(tri, edge, normal, corner[k], stroke[k], points):
+                nearest[:] = points
+                return 0.0
+    return np.sqrt(best)
+
+
+@njit(cache=True)
+def _still_plane(
+    moving: F64, still: F64, nx: float, ny: float, nz: float,
+    c0: float, s0: float, c1: float, s1: float,
+) -> float:  # fmt: skip
+    """Least of ``n . R(angle) v`` over corners v and angles, less the most of ``n . w``.
+
+    The angles run over at most half a turn between those with cosine and sine (c0, s0), (c1, s1).
+    """
+    least = np.inf
+    for k in range(3):
+        x = moving[k, 0]
+        y = moving[k, 1]
+        a = nx * x + ny * y
+        b = ny * x - nx * y
+        low = min(a * c0 + b * s0, a * c1 + b * s1)
+        if b * c0 - a * s0 < 0.0 and b * c1 - a * s1 > 0.0:
+            low = -np.hypot(a, b)
+        least = min(least, low + nz * moving[k, 2])
+    most = -np.inf
+    for k in range(3):
+        most = max(most, nx * still[k, 0] + ny * still[k, 1] + nz * still[k, 2])
+    return least - most
+
+
+@njit(cache=True)
+def _profile(outer: F64, inner: F64, a: float, b: float) -> float:
+    """Least of ``a z + b r`` on one triangle, from below, less its most on the other; b >= 0."""
+    ex = outer[0, 0] + outer[1, 0] + outer[2, 0]
+    ey = outer[0, 1] + outer[1, 1] + outer[2, 1]
+    length = np.hypot(ex, ey)
+    ex, ey = (ex / length, ey / length) if length > 0 else (1.0, 0.0)
+    least = np.inf
+    most = -np.inf
+    for k in range(3):
+        least = min(least, a * outer[k, 2] + b * (ex * outer[k, 0] + ey * outer[k, 1]))
+        most = max(most, a * inner[k, 2] + b * np.hypot(inner[k, 0], inner[k, 1]))
+    return least - most
+
+
+@njit(cache=True)
+def _ring_gap(one: F64, two: F64) -> float:
+    """Best separation by a quantity that the turn does not change."""
+    best = -np.inf
+    for i in range(0, 8, 2):
+        best = max(best, one[i] - two[i + 1], two[i] - one[i + 1])
+    dz = max(one[0] - two[1], two[0] - one[1])
+    dr = max(one[2] - two[3], two[2] - one[3])
+    if dz > 0.0 and dr > 0.0:
+        best = max(best, np.hypot(dz, dr))
+    return best
+
+
+@njit(cache=True)
+def _swept_box_gap(moving: F64, still: F64, c0: float, s0: float, c1: float, s1: float) -> float:
+    """Distance of a box from the box about all places of another box that turns."""
+    x0 = np.inf
+    x1 = -np.inf
+    y0 = np.inf
+    y1 = -np.inf
+    for i in range(0, 4, 3):
+        for j in range(1, 5, 3):
+            x = moving[i]
+            y = moving[j]
+            f0 = x * c0 - y * s0
+            g0 = x * s0 + y * c0
+            f1 = x * c1 - y * s1
+            g1 = x * s1 + y * c1
+            x0 = min(x0, f0, f1)
+            x1 = max(x1, f0, f1)
+            y0 = min(y0, g0, g1)
+            y1 = max(y1, g0, g1)
+            if g0 > 0.0 and g1 < 0.0:
+                x0 = min(x0, -np.hypot(x, y))
+            if g0 < 0.0 and g1 > 0.0:
+                x1 = max(x1, np.hypot(x, y))
+            if f0 < 0.0 and f1 > 0.0:
+                y0 = min(y0, -np.hypot(x, y))
+            if f0 > 0.0 and f1 < 0.0:
+                y1 = max(y1, np.hypot(x, y))
+    dx = max(0.0, x0 - still[3], still[0] - x1)
+    dy = max(0.0, y0 - still[4], still[1] - y1)
+    dz = max(0.0, moving[2] - still[5], still[2] - moving[5])
+    return np.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@njit(cache=True)
+def _turned(triangle: F64, cosine: float, sine: float, out: F64) -> None:
+    for k in range(3):
+        x = triangle[k, 0]
+        y = triangle[k, 1]
+        out[k, 0] = x * cosine - y * sine
+        out[k, 1] = x * sine + y * cosine
+        out[k, 2] = triangle[k, 2]
+
+
+@njit(cache=True)
+def _triangles(  # noqa: PLR0915 - one proof, its cases in order of cost
+    boxes: Boxes, t: int, s: int, low: float, high: float, wanted: float, slack: float,
+    result: F64,
+) -> int:  # fmt: skip
+    """Prove the gap of two triangles over a range of angles; see :func:`least_gap`."""
+    moving = boxes.triangle[t]
+    still = boxes.triangle[s]
+    bound = _ring_gap(boxes.own[t], boxes.own[s])
+    goal = max(wanted, result[0] - slack)
+    if bound >= goal:
+        result[1] = min(result[1], bound)
+        return DONE
+    turned = np.empty((3, 3))
+    nearest = np.empty((2, 3))
+    ranges = np.empty((64, 2))
+    ranges[0, 0] = low
+    ranges[0, 1] = high
+    depth = 1
+    while depth > 0:
+        depth -= 1
+        begin = ranges[depth, 0]
+        end = ranges[depth, 1]
+        middle = 0.5 * (begin + end)
+        cosine = np.cos(middle)
+        sine = np.sin(middle)
+        _turned(moving, cosine, sine, turned)
+        distance = triangle_distance(turned, still, nearest)
+        if distance < result[0]:
+            result[0] = distance
+            result[2] = middle
+        if distance < wanted:
+            return FAILED
+        goal = max(wanted, result[0] - slack)
+        if end == begin:
+            result[1] = min(result[1], distance)
+            continue
+        nx = (nearest[0, 0] - nearest[1, 0]) / distance
+        ny = (nearest[0, 1] - nearest[1, 1]) / distance
+        nz = (nearest[0, 2] - nearest[1, 2]) / distance
+        c0 = np.cos(begin)
+        s0 = np.sin(begin)
+        c1 = np.cos(end)
+        s1 = np.sin(end)
+        bound = _still_plane(moving, still, nx, ny, nz, c0, s0, c1, s1)
+        if bound < goal:
+            # The same plane fixed to the turning triangle: the still one turns back past it.
+            mx = -(nx * cosine + ny * sine)
+            my = -(ny * cosine - nx * sine)
+            bound = max(bound, _still_plane(still, moving, mx, my, -nz, c1, -s1, c0, -s0))
+        if bound < goal:
+            dz = nearest[0, 2] - nearest[1, 2]
+            dr = np.hypot(nearest[0, 0], nearest[0, 1]) - np.hypot(nearest[1, 0], nearest[1, 1])
+            length = np.hypot(dz, dr)
+            if length > 0.0:
+                if dr >= 0.0:
+                    whole = _profile(moving, still, dz / length, dr / length)
+                else:
+                    whole = _profile(still, moving, -dz / length, -dr / length)
+                if whole >= goal:  # at every angle
+                    result[1] = min(result[1], whole)
+                    return DONE
+        if bound >= goal:
+            result[1] = min(result[1], bound)
+        elif end - begin <= FINEST or depth + 2 > len(ranges):
+            if bound < wanted:
+                result[2] = middle
+                return UNPROVEN
+            result[1] = min(result[1], bound)
+        else:
+            ranges[depth, 0] = middle
+            ranges[depth, 1] = end
+            ranges[depth + 1, 0] = begin
+            ranges[depth + 1, 1] = middle
+            depth += 2
+    return DONE
+
+
+@njit(cache=True)
+def least_gap(  # noqa: PLR0915 - one traversal
+    boxes: Boxes, moving: int, still: int, low: float, high: float, wanted: float, slack: float,
+    result: F64,
+) -> int:  # fmt: skip
+    """Prove that a turning body keeps a gap from a still one.
+
+    Parameters
+    ----------
+    boxes : Boxes
+        Fitted in the frame of the axis.
+    moving, still : int
+        Bodies.
+    low, high : float
+        Range of angles in radians, at most half a turn; equal to look at one pose only.
+    wanted : float
+        The gap to be proven.
+    slack : float
+        How far the proven bound may stay below the smallest distance seen; the larger, the
+        quicker.
+    result : (3,) float64 array
+        In and out: smallest distance seen, least bound proven, angle of the last news.
+
+    Returns
+    -------
+    int
+        DONE, FAILED (a distance below `wanted` was seen) or UNPROVEN (neither proven nor refuted
+        at the finest division).
+    """
+    room = 256
+    pair = np.empty((room, 2), np.int32)
+    span = np.empty((room, 2))
+    pair[0, 0] = boxes.root[moving]
+    pair[0, 1] = boxes.root[still]
+    span[0, 0] = low
+    span[0, 1] = high
+    depth = 1
+    while depth > 0:
+        depth -= 1
+        a = pair[depth, 0]
+        b = pair[depth, 1]
+        begin = span[depth, 0]
+        end = span[depth, 1]
+        goal = max(wanted, result[0] - slack)
+        bound = _ring_gap(boxes.ring[a], boxes.ring[b])
+        if bound < goal:
+            c0 = np.cos(begin)
+            s0 = np.sin(begin)
+            c1 = np.cos(end)
+            s1 = np.sin(end)
+            bound = max(bound, _swept_box_gap(boxes.box[a], boxes.box[b], c0, s0, c1, s1))
+            if bound < goal and end > begin:
+                bound = max(bound, _swept_box_gap(boxes.box[b], boxes.box[a], c1, -s1, c0, -s0))
+        if bound >= goal:
+            result[1] = min(result[1], bound)
+            continue
+        leaf_a = boxes.child[a, 0] < 0
+        leaf_b = boxes.child[b, 0] < 0
+        if leaf_a and leaf_b:
+            for t in range(boxes.part[a, 0], boxes.part[a, 0] + boxes.part[a, 1]):
+                for s in range(boxes.part[b, 0], boxes.part[b, 0] + boxes.part[b, 1]):
+                    verdict = _triangles(boxes, t, s, begin, end, wanted, slack, result)
+                    if verdict != DONE:
+                        return verdict
+            continue
+        if depth + 2 > room:
+            room *= 2
+            more_pair = np.empty((room, 2), np.int32)
+            more_pair[:depth] = pair[:depth]
+            pair = more_pair
+            more_span = np.empty((room, 2))
+            more_span[:depth] = span[:depth]
+            span = more_span
+        size_a = 0.0
+        size_b = 0.0
+        for i in range(3):
+            size_a = max(size_a, boxes.box[a, 3 + i] - boxes.box[a, i])
+            size_b = max(size_b, boxes.box[b, 3 + i] - boxes.box[b, i])
+        # Turn or shape: divide what smears the pair more.
+        lever = min(boxes.ring[a, 3], boxes.ring[b, 3])
+        if lever * (end - begin) > 2.0 * max(size_a, size_b):
+            middle = 0.5 * (begin + end)
+            for way in range(2):
+                pair[depth, 0] = a
+                pair[depth, 1] = b
+                span[depth, 0] = begin if way == 1 else middle
+                span[depth, 1] = middle if way == 1 else end
+                depth += 1
+        else:
+            first = leaf_b or (not leaf_a and size_a >= size_b)
+            for way in range(2):
+                pair[depth, 0] = boxes.child[a, way] if first else a
+                pair[depth, 1] = b if first else boxes.child[b, way]
+                span[depth, 0] = begin
+                span[depth, 1] = end
+                depth += 1
+    return DONE
+
+
+@njit(cache=True)
+def sweep_pairs(
+    boxes: Boxes, moving: I32, still: I32, low: float, high: float, wanted: float, slack: float,
+    result: F64, pair: I32,
+) -> int:  # fmt: skip
+    """:func:`least_gap` of every turning with every still body.
+
+    Parameters
+    ----------
+    moving, still : (m,), (s,) int32 arrays
+        Bodies; a body in both is not paired with itself or twice with another.
+    pair : (2,) int32 array
+        Gets the two bodies with the smallest distance seen, or those where the proof failed.
+    """
+    for a in moving:
+        for b in still:
+            if a == b or (low == high and a > b):
+                continue
+            seen = result[0]
+            verdict = least_gap(boxes, a, b, low, high, wanted, slack, result)
+            if verdict != DONE or result[0] < seen:
+                pair[0] = a
+                pair[1] = b
+            if verdict != DONE:
+                return verdict
+    return DONE

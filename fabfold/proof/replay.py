@@ -1,0 +1,324 @@
+"""The folding path played in a physics simulator (MuJoCo), as a maker's hands would do it.
+
+This is a second opinion, not a proof: motors turn the hinges along the certified path, contacts
+push back, and the report says how far bodies were pressed into each other and how far the hinges
+lagged behind. The proof is :mod:`fabfold.proof.certify`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.errors import CheckError
+from fabfold.fold.clashes import meetings_on
+from fabfold.fold.cores import CORE
+from fabfold.fold.motion import Motion, end_pose_error, quarter_path
+from fabfold.progress import Progress, SilentProgress
+from fabfold.tree.fold_tree import FoldTree
+from fabfold.tree.sharing import WHOLE, unpacked
+from fabfold.tree.system import hinge_system
+
+if TYPE_CHECKING:
+    import mujoco
+
+__all__ = ["ReplayReport", "material_boxes", "replay"]
+
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+
+_TIME_STEP = 0.005
+_GAIN = 2000.0
+_BRAKE = 60.0
+_DAMPING = 1.0
+
+
+@dataclass(frozen=True)
+class ReplayReport:
+    """What the simulator saw.
+
+    Attributes
+    ----------
+    max_penetration_mm : float
+        Deepest that two boxes were pressed into each other.
+    max_angle_error_deg : float
+        Furthest that any hinge was from where it should be at the end of any move.
+    max_lag_deg : float
+        The same at any instant.
+    end_pose_error_mm : float
+        Furthest that any voxel's corner was from its place in the template at the end.
+    contact_steps : int
+        Time steps in which anything touched.
+    steps : int
+        All time steps.
+    geometry : str
+        What was simulated, in words.
+    """
+
+    max_penetration_mm: float
+    max_angle_error_deg: float
+    max_lag_deg: float
+    end_pose_error_mm: float
+    contact_steps: int
+    steps: int
+    geometry: str
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON-ready copy."""
+        return asdict(self)
+
+
+def material_boxes(
+    tree: FoldTree,
+    meshes: Sequence[tuple[F64, I32]],
+    voxel_mm: float,
+    origin_mm: Sequence[float],
+    gap_mm: float,
+    interlocked: Collection[int] = (),
+) -> list[tuple[int, F64, F64]]:
+    """Boxes about the material that each body has in each of its cells.
+
+    Parameters
+    ----------
+    tree, meshes, voxel_mm, origin_mm
+        As for :func:`fabfold.proof.certify.certify`.
+    gap_mm : float
+        Boxes of neighbouring cells end this far apart.
+    interlocked : collection of int
+        Voxels that were carved so that they pass each other: a box cannot follow a round, so the
+        box is about what lies in the core of the cell.
+
+    Of a voxel that shares its cell in B there is a box about the material in each eighth.
+
+    Returns
+    -------
+    list of (body, low, high)
+        Corners in lattice units of shape A; cells without material are left out. A link plate is a
+        sheet of a third of the gap in the middle of its face: its pockets do not show in boxes.
+    """
+    import manifold3d
+
+    half = 0.5 - 0.5 * gap_mm / voxel_mm
+    found = []
+    for index, (body, (vertices, faces)) in enumerate(zip(tree.bodies, meshes, strict=True)):
+        if body.edge is not None:
+            found.append((index, *_sheet(tree, index, vertices, voxel_mm, origin_mm, gap_mm)))
+            continue
+        lattice = (np.asarray(vertices, dtype=float) - np.asarray(origin_mm, float)) / voxel_mm
+        solid = manifold3d.Manifold(
+            manifold3d.Mesh64(
+                np.ascontiguousarray(lattice),
+                np.ascontiguousarray(faces, dtype=np.uint64),
+            )
+        )
+        for voxel in body.voxels:
+            reach = CORE if voxel in interlocked else half
+            for middle, most in _parts(tree, voxel, reach):
+                piece = solid
+                for axis in range(3):
+                    for sign in (1.0, -1.0):
+                        normal = [0.0, 0.0, 0.0]
+                        normal[axis] = sign
+                        piece = piece.trim_by_plane(normal, float(sign * middle[axis]) - most)
+                if piece.is_empty():
+                    continue
+                box = np.array(piece.bounding_box())
+                if (box[3:] - box[:3]).min() > 1e-6:
+                    found.append((index, box[:3], box[3:]))
+    return found
+
+
+def _parts(tree: FoldTree, voxel: int, reach: float) -> list[tuple[F64, float]]:
+    """Middle and half side of the cubes that hold a voxel's material: its cell, or eighths."""
+    cell = tree.source[voxel].astype(float)
+    if tree.octants is None or tree.octants[voxel] == WHOLE:
+        return [(cell, reach)]
+    sides = np.argwhere(unpacked(tree.octants[voxel : voxel + 1])[0])
+    return [(cell + side / 2 - 0.25, reach - 0.25) for side in sides]
+
+
+def _sheet(
+    tree: FoldTree,
+    link: int,
+    vertices: F64,
+    voxel_mm: float,
+    origin_mm: Sequence[float],
+    gap_mm: float,
+) -> tuple[F64, F64]:
+    """Corners of the sheet that stands for a link plate, lattice units of shape A."""
+    number = tree.bodies[link].edge
+    edge = tree.edges[-1 if number is None else number]
+    parent, child = tree.source[edge.parent].astype(float), tree.source[edge.child].astype(float)
+    lattice = (np.asarray(vertices, dtype=float) - np.asarray(origin_mm, float)) / voxel_mm
+    flat = child == parent
+    # Knuckles stand out of the face beyond the axes.
+    room = 0.5 - 0.5 * gap_mm / voxel_mm
+    middle, thick = (parent + child) / 2, gap_mm / voxel_mm / 6
+    low = np.where(flat, np.maximum(lattice.min(axis=0), middle - room), middle - thick)
+    high = np.where(flat, np.minimum(lattice.max(axis=0), middle + room), middle + thick)
+    return low, high
+
+
+def _model(tree: FoldTree, boxes: list[tuple[int, F64, F64]]) -> mujoco.MjModel:
+    """Bodies with all frames at the origin of shape A, joint positions in its coordinates."""
+    import mujoco
+
+    spec = mujoco.MjSpec()
+    spec.option.gravity = [0.0, 0.0, 0.0]
+    spec.option.timestep = _TIME_STEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    # A rigid group must not pass through the body that it hangs on.
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
+    bodies = [spec.worldbody.add_body(name=tree.bodies[0].name)]
+    for hinge in tree.hinges:
+        body = bodies[hinge.parent].add_body(name=tree.bodies[hinge.child].name)
+        body.add_joint(
+            name=hinge.name,
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            pos=list(hinge.point),
+            axis=[float(x) for x in hinge.direction],
+            armature=0.02,
+            damping=[_DAMPING, 0.0, 0.0],
+        )
+        motor = spec.add_actuator(name=hinge.name, target=hinge.name)
+        motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        motor.set_to_position(kp=_GAIN, kv=_BRAKE)
+        bodies.append(body)
+    for index, low, high in boxes:
+        bodies[index].add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=(0.5 * (low + high)).tolist(),
+            size=(0.5 * (high - low)).tolist(),
+            density=0.02,
+            condim=1,
+            solref=[0.02, 1.0],
+        )
+    filled = {index for index, _, _ in boxes}
+    for index, body in enumerate(bodies):
+        if index in filled:
+            continue
+        # Every body weighs something, also one whose material all lies outside its cells.
+        centre = tree.hinges[index - 1].point if index else (0.0, 0.0, 0.0)
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            pos=list(centre),
+            size=[0.2, 0.0, 0.0],
+            density=0.02,
+            contype=0,
+            conaffinity=0,
+        )
+    return spec.compile()
+
+
+def _interlocked(tree: FoldTree, motion: Motion) -> set[int]:
+    """Voxels that run into others as whole cells, on a path from state to state of the lattice."""
+    path = quarter_path(tree, motion)
+    if path is None or tree.octants is not None:
+        return set()
+    return {v for m in meetings_on(hinge_system(tree), path) for v in (m.first, m.second)}
+
+
+def replay(
+    tree: FoldTree,
+    motion: Motion,
+    meshes: Sequence[tuple[F64, I32]],
+    voxel_mm: float,
+    origin_mm: Sequence[float],
+    progress: Progress | None = None,
+    *,
+    gap_mm: float | None = None,
+    seconds_per_quarter: float = 3.0,
+) -> ReplayReport:
+    """Fold the bodies in MuJoCo along the path.
+
+    Each body is a set of boxes, one about its material in each cell (hinge barrels that stand out
+    of the cell are not simulated); a link plate is a sheet between them. The root body is held; a
+    position motor on every hinge follows the path, speeding up and slowing down smoothly in every
+    move.
+
+    Parameters
+    ----------
+    tree, motion, meshes, voxel_mm, origin_mm
+        As for :func:`fabfold.proof.certify.certify`.
+    progress : Progress, optional
+    gap_mm : float, optional
+        Gap between the boxes of neighbouring cells; the certified gap of `motion` if it has one,
+        else 1.5 % of a voxel.
+    seconds_per_quarter : float
+        Simulated time for 90°.
+
+    Returns
+    -------
+    ReplayReport
+        The same for the same arguments.
+
+    Raises
+    ------
+    CheckError
+        If the simulation diverges.
+    """
+    import mujoco
+
+    told = progress or SilentProgress()
+    if gap_mm is None:
+        gap_mm = float(motion.certificate.get("min_gap_mm", 0.015 * voxel_mm))
+    interlocked = _interlocked(tree, motion)
+    boxes = material_boxes(tree, meshes, voxel_mm, origin_mm, gap_mm, interlocked)
+    model = _model(tree, boxes)
+    data = mujoco.MjData(model)
+    # The compiler numbers bodies depth first: ask for places by name.
+    joint = np.array([int(model.joint(h.name).qposadr[0]) for h in tree.hinges], dtype=int)
+    motor = np.array([model.actuator(h.name).id for h in tree.hinges], dtype=int)
+
+    worst = lag = 0.0
+    deepest = 0.0
+    touching = steps = 0
+    moves = len(motion.moves) - 1
+    for number in range(1, moves + 1):
+        told.update((number - 1) / moves, f"replaying move {number} of {moves}")
+        start, end = np.radians(motion.angles_deg[number - 1 : number + 1])
+        quarters = float(np.abs(end - start).max() / (np.pi / 2))
+        count = max(1, round(seconds_per_quarter * quarters / _TIME_STEP))
+        for step in range(1, count + 1):
+            share = step / count
+            rate = 30.0 * (share * (1.0 - share)) ** 2 / (count * _TIME_STEP)
+            share = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+            goal = start + (end - start) * share
+            # The motor brakes by its own damping; ask for a little more, to be there on time.
+            data.ctrl[motor] = goal + (end - start) * rate * (_BRAKE + _DAMPING) / _GAIN
+            mujoco.mj_step(model, data)
+            steps += 1
+            lag = max(lag, float(np.abs(data.qpos[joint] - goal).max(initial=0.0)))
+            if data.ncon:
+                touching += 1
+                deepest = max(deepest, -float(data.contact.dist.min()))
+        worst = max(worst, float(np.abs(data.qpos[joint] - end).max(initial=0.0)))
+        if not np.isfinite(data.qpos).all():
+            raise CheckError(
+                f"replay: the simulation diverged in move {number} of {moves}; "
+                "the bodies press against each other"
+            )
+    angles = np.degrees(data.qpos[joint])
+    told.update(1.0, f"deepest contact {deepest * voxel_mm:.3f} mm")
+    links = sum(body.edge is not None for body in tree.bodies)
+    cores = f", {len(interlocked)} carved cells by their cores" if interlocked else ""
+    sheets = f", {links} link plates as sheets between them" if links else ""
+    return ReplayReport(
+        max_penetration_mm=round(deepest * voxel_mm, 4),
+        max_angle_error_deg=round(float(np.degrees(worst)), 4),
+        max_lag_deg=round(float(np.degrees(lag)), 4),
+        end_pose_error_mm=round(end_pose_error(tree, angles) * voxel_mm, 4),
+        contact_steps=touching,
+        steps=steps,
+        geometry=(
+            f"{len(boxes) - links} boxes about the material of {len(tree.bodies) - links} bodies "
+            f"in each cell, {gap_mm:g} mm apart{cores}{sheets}, hinge barrels left out; root "
+            "held, no gravity, "
+            f"{seconds_per_quarter:g} s for 90°"
+        ),
+    )

@@ -1,0 +1,331 @@
+"""A second opinion on the folding path: the printed bodies, posed degree by degree.
+
+The proof of :mod:`fabfold.proof.certify` covers every angle by means of our own. This check takes
+nothing from it: forward kinematics of its own from the content of ``tree.json`` and
+``motion.json``, collision and distance by FCL, volumes by manifold3d. It proves nothing between its
+samples, but a fault that both have is hard to imagine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.progress import Progress, SilentProgress
+
+__all__ = ["SampledPath", "sample_path"]
+
+F64 = NDArray[np.float64]
+Mesh = tuple[NDArray[np.float64], NDArray[np.int32]]
+Poses = dict[str, F64]
+
+
+@dataclass(frozen=True)
+class SampledPath:
+    """What was seen along a path.
+
+    Attributes
+    ----------
+    step_deg, gap_step_deg : float
+        Degrees between two poses at which collisions were looked for, and distance measured.
+    poses : int
+        Poses looked at.
+    least_mm : float
+        Smallest distance of two bodies measured; 0.0 where some collide.
+    where : str
+        Where that was: move, angle and bodies.
+    hits : tuple of str
+        The first collision of every move that has one: move, angle and bodies.
+    overlap_mm3 : float
+        Volume that bodies share in shape A and in shape B; finds a body inside another.
+    """
+
+    step_deg: float
+    gap_step_deg: float
+    poses: int
+    least_mm: float
+    where: str
+    hits: tuple[str, ...]
+    overlap_mm3: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether no two bodies were seen to touch."""
+        return not self.hits and self.least_mm > 0.0
+
+
+def _turn(point: F64, direction: Sequence[float], degrees: float) -> F64:
+    """Rigid transform that turns space about a line (Rodrigues), shape (4, 4)."""
+    x, y, z = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
+    sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
+    rest = 1.0 - cosine
+    out = np.eye(4)
+    out[:3, :3] = [
+        [cosine + x * x * rest, x * y * rest - z * sine, x * z * rest + y * sine],
+        [y * x * rest + z * sine, cosine + y * y * rest, y * z * rest - x * sine],
+        [z * x * rest - y * sine, z * y * rest + x * sine, cosine + z * z * rest],
+    ]
+    out[:3, 3] = point - out[:3, :3] @ point
+    return out
+
+
+class _Linkage:
+    """Bodies and hinges by name, in mm."""
+
+    def __init__(self, tree: Mapping[str, Any], names: Sequence[str]) -> None:
+        scale, origin = float(tree["voxel_mm"]), np.array(tree["origin_mm"], dtype=float)
+        self.root = str(tree["bodies"][0]["name"])
+        self.point = {h["name"]: origin + scale * np.array(h["point"]) for h in tree["hinges"]}
+        self.direction = {h["name"]: h["dir"] for h in tree["hinges"]}
+        self.ends = {h["name"]: (h["parent"], h["child"]) for h in tree["hinges"]}
+        self.names = list(names)
+
+    def poses(self, angles: Mapping[str, float]) -> Poses:
+        """Where every body is, as a transform from its place in shape A."""
+        out = {self.root: np.eye(4)}
+        waiting = list(self.ends)
+        while waiting:
+            later = []
+            for hinge in waiting:
+                parent, child = self.ends[hinge]
+                if parent not in out:
+                    later.append(hinge)
+                    continue
+                turn = _turn(self.point[hinge], self.direction[hinge], angles[hinge])
+                out[child] = out[parent] @ turn
+            if len(later) == len(waiting):
+                raise ValueError(f"hinges {later} hang on no body that the root carries")
+            waiting = later
+        return out
+
+    def carried(self, hinge: str) -> set[str]:
+        """Bodies that a hinge turns."""
+        out = {self.ends[hinge][1]}
+        while True:
+            more = {child for parent, child in self.ends.values() if parent in out} - out
+            if not more:
+                return out
+            out |= more
+
+
+def _placed(mesh: Mesh, pose: F64) -> F64:
+    return np.asarray(mesh[0], dtype=float) @ pose[:3, :3].T + pose[:3, 3]
+
+
+class _Group:
+    """Some bodies as one mesh of FCL."""
+
+    def __init__(self, names: Sequence[str], meshes: Mapping[str, Mesh], poses: Poses) -> None:
+        import fcl
+
+        self.names = list(names)
+        vertices = [_placed(meshes[name], poses[name]) for name in names]
+        starts = np.cumsum([0] + [len(v) for v in vertices])
+        faces = [np.asarray(meshes[n][1]) + s for n, s in zip(names, starts, strict=False)]
+        self._ends = np.cumsum([len(f) for f in faces])
+        model = fcl.BVHModel()
+        model.beginModel(int(starts[-1]), int(self._ends[-1]))
+        model.addSubModel(np.concatenate(vertices), np.concatenate(faces))
+        model.endModel()
+        self.thing = fcl.CollisionObject(model)
+
+    def turn(self, pose: F64) -> None:
+        import fcl
+
+        self.thing.setTransform(fcl.Transform(pose[:3, :3], pose[:3, 3]))
+
+    def owner(self, triangle: int) -> str:
+        """Body that a triangle belongs to."""
+        return self.names[int(np.searchsorted(self._ends, triangle, side="right"))]
+
+
+def _collision(one: _Group, two: _Group) -> str | None:
+    """Two bodies that collide, if any do."""
+    import fcl
+
+    result = fcl.CollisionResult()
+    request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=True)
+    if not fcl.collide(one.thing, two.thing, request, result):
+        return None
+    contact = result.contacts[0]
+    return f"{one.owner(contact.b1)} and {two.owner(contact.b2)}"
+
+
+def _distance(one: _Group, two: _Group) -> tuple[float, str]:
+    """Distance of two groups, and the two bodies nearest to each other."""
+    import fcl
+
+    result = fcl.DistanceResult()
+    value = fcl.distance(one.thing, two.thing, fcl.DistanceRequest(), result)
+    return max(0.0, float(value)), f"{one.owner(result.b1)} and {two.owner(result.b2)}"
+
+
+def _overlap(meshes: Mapping[str, Mesh], poses: Poses) -> float:
+    """Volume of all bodies together less that of their union."""
+    import manifold3d
+
+    solids = [
+        manifold3d.Manifold(
+            manifold3d.Mesh64(
+                np.ascontiguousarray(_placed(mesh, poses[name])),
+                np.ascontiguousarray(mesh[1], dtype=np.uint64),
+            )
+        )
+        for name, mesh in meshes.items()
+    ]
+    whole = manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
+    return max(0.0, float(sum(solid.volume() for solid in solids) - whole.volume()))
+
+
+class _Watch:
+    """What was seen so far."""
+
+    def __init__(self) -> None:
+        self.least = math.inf
+        self.where = ""
+        self.hits: list[str] = []
+        self.poses = 0
+
+    def see(self, one: _Group, two: _Group, where: str, measure: bool) -> bool:
+        """Look at one pose; False where bodies collide."""
+        self.poses += 1
+        pair = _collision(one, two)
+        if pair is not None:
+            self.hits.append(f"{where}: {pair}")
+            self.least, self.where = 0.0, self.hits[0]
+            return False
+        if measure:
+            gap, pair = _distance(one, two)
+            if gap < self.least:
+                self.least, self.where = gap, f"{where}: {pair}"
+        return True
+
+
+def _boxes_apart(one: F64, two: F64) -> float:
+    """Distance of the bounding boxes of two sets of points."""
+    low = np.maximum(one.min(axis=0), two.min(axis=0))
+    high = np.minimum(one.max(axis=0), two.max(axis=0))
+    return float(np.linalg.norm(np.maximum(low - high, 0.0)))
+
+
+def _see_start(watch: _Watch, meshes: Mapping[str, Mesh], poses: Poses) -> None:
+    """All pairs in shape A, save those whose boxes are farther apart than the least so far."""
+    groups = {name: _Group([name], meshes, poses) for name in meshes}
+    points = {name: _placed(meshes[name], poses[name]) for name in meshes}
+    names = list(meshes)
+    for i, one in enumerate(names):
+        for two in names[:i]:
+            if _boxes_apart(points[one], points[two]) <= watch.least:
+                watch.see(groups[one], groups[two], "shape A", True)
+    watch.poses = 1
+
+
+def sample_path(
+    tree: Mapping[str, Any],
+    motion: Mapping[str, Any],
+    meshes: Mapping[str, Mesh],
+    *,
+    step_deg: float = 1.0,
+    gap_step_deg: float | None = None,
+    progress: Progress | None = None,
+) -> SampledPath:
+    """Look at the printed bodies along the whole folding path, one pose every degree.
+
+    In shape A all pairs of bodies are looked at; in each move those that turn against those that
+    stay, since the others do not move relative to each other.
+
+    Parameters
+    ----------
+    tree, motion : mapping
+        The content of ``tree.json`` and ``motion.json``; one hinge turns in a move.
+    meshes : mapping of str to (vertices, faces)
+        Closed mesh of every body by name, link plates of double hinges included: (v, 3) in mm in
+        shape A, (f, 3).
+    step_deg : float
+        Most degrees between two poses that are searched for collisions.
+    gap_step_deg : float, optional
+        The same for the distance, which takes FCL some twenty times as long; default `step_deg`.
+        It is measured at both ends of every move in any case.
+    progress : Progress, optional
+
+    Returns
+    -------
+    SampledPath
+
+    Raises
+    ------
+    ValueError
+        If a body has no mesh, more than one hinge turns in a move, or a step is not above 0.
+    """
+    told = progress or SilentProgress()
+    gap_step = step_deg if gap_step_deg is None else gap_step_deg
+    if not (step_deg > 0 and gap_step > 0):
+        raise ValueError("step_deg and gap_step_deg must be above 0")
+    names = [str(body["name"]) for body in tree["bodies"]]
+    if set(names) != set(meshes):
+        raise ValueError(f"no mesh for {sorted(set(names) ^ set(meshes))}, or no such body")
+    linkage = _Linkage(tree, names)
+    hinges: list[str] = list(motion["hinges"])
+    frames = [np.array(frame["angles_deg"], dtype=float) for frame in motion["keyframes"]]
+
+    def poses_at(angles: F64) -> Poses:
+        return linkage.poses(dict(zip(hinges, angles.tolist(), strict=True)))
+
+    watch = _Watch()
+    told.update(0.0, "looking at shape A")
+    _see_start(watch, meshes, poses_at(frames[0]))
+    overlap = _overlap(meshes, poses_at(frames[0])) + _overlap(meshes, poses_at(frames[-1]))
+    total = len(frames) - 1
+    for number in range(1, total + 1):
+        before, after = frames[number - 1 : number + 1]
+        turning = np.flatnonzero(before != after)
+        if len(turning) != 1:
+            raise ValueError(f"move {number}: {len(turning)} hinges turn, wants one")
+        hinge = hinges[int(turning[0])]
+        turn = float((after - before)[turning[0]])
+        move = f"move {number} of {total} ({hinge})"
+        told.update((number - 1) / total, f"looking at {move}")
+        _see_move(watch, linkage, meshes, poses_at(before), hinge, turn, move, step_deg, gap_step)
+    told.update(1.0, f"{watch.poses} poses, smallest gap {watch.least:.3f} mm")
+    return SampledPath(
+        step_deg=step_deg,
+        gap_step_deg=gap_step,
+        poses=watch.poses,
+        least_mm=watch.least,
+        where=watch.where,
+        hits=tuple(watch.hits),
+        overlap_mm3=overlap,
+    )
+
+
+def _see_move(
+    watch: _Watch,
+    linkage: _Linkage,
+    meshes: Mapping[str, Mesh],
+    poses: Poses,
+    hinge: str,
+    turn: float,
+    move: str,
+    step: float,
+    gap_step: float,
+) -> None:
+    """All poses of one move, up to its first collision."""
+    carried = linkage.carried(hinge)
+    moving = _Group([name for name in linkage.names if name in carried], meshes, poses)
+    resting = _Group([name for name in linkage.names if name not in carried], meshes, poses)
+    parent = poses[linkage.ends[hinge][0]]
+    point = parent[:3, :3] @ linkage.point[hinge] + parent[:3, 3]
+    direction = parent[:3, :3] @ np.array(linkage.direction[hinge], dtype=float)
+    count = max(1, math.ceil(abs(turn) / step - 1e-9))
+    every = max(1, math.floor(gap_step / (abs(turn) / count) + 1e-9))
+    for k in range(count + 1):
+        angle = turn * k / count
+        moving.turn(_turn(point, direction, angle))
+        where = f"{move}, {abs(angle):g}°"
+        if not watch.see(moving, resting, where, k % every == 0 or k == count):
+            return

@@ -1,0 +1,1 @@
+"""The recipe of a kit: every choice that its bytes depend on."""

@@ -1,0 +1,220 @@
+"""The recipe of a kit: every choice that its bytes depend on (``kit.toml``)."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tomlkit
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
+
+from fabfold.errors import FabfoldError, RecipeError
+from fabfold.lattice.shipped import load_template
+from fabfold.recipe.targets import is_file_name
+from fabfold.tree.catalogue import JointSet
+from fabfold.version import __version__
+
+__all__ = ["Recipe", "read_recipe"]
+
+Vector = tuple[float, float, float]
+
+#: Words for numbers.
+_PREFER = {"hinges": 0.0, "balanced": 0.5, "surface": 1.0}
+_VOID = {"inside": 1.0, "even": 0.0, "surface": -1.0}
+
+
+class Recipe(BaseModel):
+    """Everything that decides a kit, after defaults.
+
+    The same recipe gives the same kit, byte for byte, whatever the number of workers.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    model: Annotated[str, Field(min_length=1, description="file name, or sample:NAME")]
+    sha256: Annotated[str, Field(description="digest of the model's file")] = ""
+    template: Annotated[str, Field(description="box-AxBxC, a template's name or file")]
+    template_sha256: Annotated[str, Field(description="digest of the template's file")] = ""
+    template_cells: Annotated[
+        int | None, Field(ge=2, le=4096, description="cells of a template that is a mesh")
+    ] = None
+    voxel_mm: Annotated[float, Field(gt=0, le=1000, description="side of a voxel, mm")] = 20.0
+    profile: Annotated[str, Field(description="printer and material, or a .toml file")] = "mjf-pa12"
+    clearance_mm: Annotated[
+        float | None,
+        Field(gt=0, le=5, description="gap in hinges and faces; default: the profile's"),
+    ] = None
+    seed: Annotated[int, Field(ge=0, lt=2**31, description="seed of every random choice")] = 1
+    effort: Annotated[
+        Literal["quick", "normal", "thorough"], Field(description="how long the search goes on")
+    ] = "normal"
+    rounds: Annotated[
+        int, Field(ge=1, le=1000, description="rounds of seeds before the search gives up")
+    ] = 8
+    drop_below: Annotated[
+        float, Field(ge=0, le=0.5, description="cells with a smaller share of material are dropped")
+    ] = 0.04
+    rotation: Annotated[
+        Vector | None, Field(description="grid placement by hand: x, y, z rotation in degrees")
+    ] = None
+    origin: Annotated[
+        Vector | None, Field(description="grid placement by hand: lattice origin in model units")
+    ] = None
+    pitch: Annotated[
+        float | None, Field(gt=0, description="grid placement by hand: voxel side in model units")
+    ] = None
+    surface_weight: Annotated[float, Field(ge=0, le=100, description="weight of Eq. 8")] = 0.3
+    single_weight: Annotated[float, Field(ge=0, le=100, description="weight of a single hinge")] = (
+        0.1
+    )
+
+    prefer: Annotated[
+        float,
+        Field(ge=0, le=1, description="0 fewest hinges, 0.5 balanced, 1 best surface"),
+    ] = 0.5
+    void: Annotated[
+        float,
+        Field(ge=-1, le=1, description="empty space: 1 inside the box, -1 at its surface, 0 even"),
+    ] = 0.0
+    keep: Annotated[
+        tuple[str, ...], Field(description="what shall be seen where on the box, WHAT:SIDE")
+    ] = ()
+    keep_weight: Annotated[
+        float, Field(ge=0, le=100, description="energy of a kept face that is elsewhere")
+    ] = 0.3
+    protect: Annotated[
+        tuple[str, ...], Field(description="regions of the model that no cut may cross")
+    ] = ()
+    joints: Annotated[
+        JointSet,
+        Field(description="hinges: S single, S+D double ones too, S90 and all: quarter turns too"),
+    ] = "S"
+    double_weight: Annotated[float, Field(ge=0, le=100, description="weight of a double hinge")] = (
+        0.12
+    )
+    joints_inside: Annotated[
+        bool, Field(description="no hinge on the visible faces of the box")
+    ] = False
+    share: Annotated[
+        bool, Field(description="two voxels may share a cell where their material allows it")
+    ] = False
+    pick: Annotated[
+        int, Field(ge=0, le=1000, description="solution of the Pareto list; 0 is the best tree")
+    ] = 0
+
+    @field_validator("prefer", mode="before")
+    @classmethod
+    def _named_preference(cls, value: object) -> object:
+        return _PREFER.get(value, value) if isinstance(value, str) else value
+
+    @field_validator("void", mode="before")
+    @classmethod
+    def _named_void(cls, value: object) -> object:
+        return _VOID.get(value, value) if isinstance(value, str) else value
+
+    @field_validator("keep", "protect")
+    @classmethod
+    def _readable_regions(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        from fabfold.solid.regions import parse_keep, parse_shape
+
+        texts = tuple(text for text in value if text != "none")
+        for text in texts:
+            if info.field_name == "keep":
+                parse_keep(text, "--keep")
+            else:
+                parse_shape(text, "--protect")
+        return texts
+
+    @field_validator("template")
+    @classmethod
+    def _known_template(cls, value: str) -> str:
+        # A file is read by the kit, which knows where it is kept.
+        if not is_file_name(value):
+            load_template(value)
+        return value
+
+    @property
+    def name(self) -> str:
+        """Stem of the model's name: what the kit's files are called."""
+        if self.model.startswith("sample:"):
+            return self.model.removeprefix("sample:")
+        return Path(self.model).stem
+
+    def to_toml(self) -> str:
+        """The content of ``kit.toml``, each value with what it means."""
+        document = tomlkit.document()
+        document.add("format", tomlkit.item("fabfold-kit"))
+        document.add("version", tomlkit.item(1))
+        document.add("fabfold", tomlkit.item(__version__))
+        table = tomlkit.table()
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            if value is None:
+                table.add(tomlkit.comment(f"{name}: {field.description}"))
+                continue
+            item = tomlkit.item(list(value) if isinstance(value, tuple) else value)
+            if field.description:
+                item.comment(field.description)
+            table.add(name, item)
+        document.add("recipe", table)
+        return tomlkit.dumps(document)
+
+
+def make_recipe(**values: Any) -> Recipe:
+    """Recipe from keyword values; those that are None take their default.
+
+    Raises
+    ------
+    RecipeError
+        Naming each value that is wrong and why.
+    """
+    try:
+        return Recipe(**{key: value for key, value in values.items() if value is not None})
+    except ValidationError as error:
+        raise RecipeError(_plainly(error)) from None
+
+
+def read_recipe(path: Path) -> Recipe:
+    """Recipe from a ``kit.toml``.
+
+    Raises
+    ------
+    RecipeError
+        If the file is not a recipe, or a value is wrong.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise RecipeError(f"{path}: cannot be read as a recipe: {error}") from None
+    if data.get("format") != "fabfold-kit" or data.get("version") != 1:
+        raise RecipeError(
+            f'{path}: wants format = "fabfold-kit" and version = 1, '
+            f"found {data.get('format')!r} and {data.get('version')!r}"
+        )
+    table = data.get("recipe")
+    if not isinstance(table, dict):
+        raise RecipeError(f"{path}: has no [recipe] table")
+    try:
+        return make_recipe(**table)
+    except FabfoldError as error:
+        raise RecipeError(f"{path}: {error}") from None
+
+
+def _plainly(error: ValidationError) -> str:
+    parts = []
+    for problem in error.errors():
+        where = ".".join(str(part) for part in problem["loc"]) or "recipe"
+        if problem["type"] == "extra_forbidden":
+            known = ", ".join(Recipe.model_fields)
+            parts.append(f"{where}: no such option; there are {known}")
+        else:
+            parts.append(f"{where} = {problem['input']!r}: {problem['msg'].lower()}")
+    return "; ".join(parts)

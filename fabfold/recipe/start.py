@@ -1,0 +1,116 @@
+"""Where a kit begins: its recipe, the files that the recipe names, and the folder it may have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fabfold.errors import KitError, ModelError
+from fabfold.files import sha256_of
+from fabfold.recipe.recipe import Recipe, make_recipe, read_recipe
+from fabfold.recipe.targets import find_input, is_file_name, named_target
+
+__all__ = ["Start", "check_free", "start_of"]
+
+#: Target of a model that says nothing of its own.
+_USUAL = "box-4x4x4"
+
+
+@dataclass(frozen=True)
+class Start:
+    """What a kit starts from.
+
+    Attributes
+    ----------
+    recipe : Recipe
+    model : Path or None
+        The model's file; None for a sample.
+    template : Path or None
+        The template's file; None for a box or a shipped template.
+    folder : Path or None
+        Kit folder; None where there is none yet.
+    """
+
+    recipe: Recipe
+    model: Path | None
+    template: Path | None
+    folder: Path | None
+
+
+def start_of(source: str, folder: Path | None, options: Mapping[str, Any]) -> Start:
+    """Recipe and files of a model file, ``sample:NAME``, a ``kit.toml`` or a kit folder.
+
+    Parameters
+    ----------
+    source : str
+    folder : Path or None
+        Kit folder; for a kit folder or its ``kit.toml`` the default is that folder.
+    options : mapping
+        Fields of the recipe; those that are None keep the recipe's or the default value.
+
+    Raises
+    ------
+    KitError
+        If `source` is a folder without a kit.
+    ModelError
+        If there is no such file or sample.
+    RecipeError
+        If the recipe or an option is wrong.
+    """
+    given = {key: value for key, value in options.items() if value is not None}
+    template: Path | None = None
+    if "template" in given:
+        fields, template = named_target(str(given["template"]))
+        given.update(fields)
+    path = Path(source)
+    if path.is_dir():
+        if not (path / "kit.toml").is_file():
+            raise KitError(f"{path}: a folder without kit.toml is no kit; give a model file")
+        path = path / "kit.toml"
+    if path.suffix == ".toml":
+        return _of_recipe(path, path.parent if folder is None else folder, given, template)
+    if source.startswith("sample:"):
+        from fabfold.samples.catalogue import sample
+
+        given.setdefault("template", sample(source.removeprefix("sample:")).template)
+        return Start(make_recipe(model=source, **given), None, template, folder)
+    if not path.is_file():
+        raise ModelError(f"{source}: no such file (built-in samples are written sample:NAME)")
+    given.setdefault("template", _USUAL)
+    recipe = make_recipe(model=path.name, sha256=sha256_of(path), **given)
+    return Start(recipe, path, template, folder)
+
+
+def _of_recipe(path: Path, folder: Path, given: dict[str, Any], template: Path | None) -> Start:
+    """A written recipe with some of its fields changed."""
+    recipe = read_recipe(path)
+    if template is None and "template" not in given and is_file_name(recipe.template):
+        template = find_input(recipe.template, recipe.template_sha256, path.parent, "template")
+        given.update(named_target(str(template))[0])
+    elif "template" in given and "template_cells" not in given:
+        given["template_cells"] = None
+    recipe = make_recipe(**{**recipe.model_dump(), **given})
+    model: Path | None = None
+    if not recipe.model.startswith("sample:"):
+        model = find_input(recipe.model, recipe.sha256, path.parent, "model")
+    return Start(recipe, model, template, folder)
+
+
+def check_free(folder: Path) -> None:
+    """Refuse a folder that holds something that is no kit.
+
+    Raises
+    ------
+    KitError
+        If it does, or is a file.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise KitError(f"{folder}: is a file; give another folder for the kit")
+    if folder.is_dir():
+        names = {entry.name for entry in folder.iterdir()}
+        if names and not names & {"kit.toml", "stages"}:
+            raise KitError(
+                f"{folder}: holds files that are no kit; give another or an empty folder"
+            )

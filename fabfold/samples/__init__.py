@@ -1,0 +1,1 @@
+"""Built-in models, drawn with build123d."""

@@ -1,0 +1,168 @@
+"""Built-in samples: models of our own, drawn with build123d, to fold without a file at hand."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fabfold.errors import GeometryError, ModelError
+from fabfold.solid.closed_solid import Solid
+
+if TYPE_CHECKING:
+    import build123d
+
+__all__ = [
+    "PREFIX",
+    "Sample",
+    "build_sample",
+    "load_model",
+    "load_sample",
+    "sample",
+    "sample_names",
+    "solid_of",
+]
+
+#: What the name of a sample begins with where a model file could stand.
+PREFIX = "sample:"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A built-in model.
+
+    Attributes
+    ----------
+    name : str
+        As in ``sample:NAME``.
+    title : str
+        What it shows, in a few words.
+    template : str
+        The box that it is meant for.
+    version : int
+        Counts changes of the shape.
+    """
+
+    name: str
+    title: str
+    template: str
+    version: int
+
+
+_SAMPLES = {
+    sample.name: sample
+    for sample in (
+        Sample("car", "a chunky little car", "box-3x4x4", 1),
+        Sample("duck", "a bath duck", "box-4x4x4", 1),
+        Sample("elephant", "an elephant with trunk and tusks", "box-4x4x4", 1),
+        Sample("locomotive", "a small tank locomotive", "box-4x4x4", 1),
+        Sample("rabbit", "a sitting rabbit", "box-4x4x4", 1),
+    )
+}
+
+
+def sample_names() -> list[str]:
+    """Names of the samples, sorted."""
+    return sorted(_SAMPLES)
+
+
+def sample(name: str) -> Sample:
+    """What is known of a sample before it is built.
+
+    Raises
+    ------
+    ModelError
+        If there is no such sample.
+    """
+    try:
+        return _SAMPLES[name]
+    except KeyError:
+        raise ModelError(f"no sample {name!r}: there are {', '.join(sample_names())}") from None
+
+
+def build_sample(name: str) -> build123d.Part:
+    """Draw a sample.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`sample_names`.
+
+    Returns
+    -------
+    build123d.Part
+        One valid solid that stands on z = 0 and looks along +x.
+
+    Raises
+    ------
+    ModelError
+        If there is no such sample.
+    """
+    known = sample(name)
+    draw: Callable[[], Any] = import_module(f"fabfold.samples.{known.name}").draw
+    part = draw()
+    if len(part.solids()) != 1 or not part.is_valid:
+        raise GeometryError(f"sample {name!r} did not come out as one valid solid")
+    part.label = known.name
+    return part
+
+
+def load_sample(name: str) -> Solid:
+    """A sample as a closed manifold, the same bytes every time.
+
+    Raises
+    ------
+    ModelError
+        If there is no such sample.
+    """
+    return solid_of(build_sample(name), sample(name))
+
+
+def load_model(source: str | Path) -> Solid:
+    """A model file or a built-in sample as a closed manifold.
+
+    Parameters
+    ----------
+    source : str or Path
+        Path of a model file, or ``"sample:NAME"``.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file or sample, or the file is not one solid.
+    """
+    from fabfold.solid.load import load_solid
+
+    text = str(source)
+    if text.startswith(PREFIX):
+        return load_sample(text.removeprefix(PREFIX))
+    return load_solid(source)
+
+
+def solid_of(part: build123d.Part, known: Sample) -> Solid:
+    """Mesh of a drawn sample.
+
+    Parameters
+    ----------
+    part : build123d.Part
+        What :func:`build_sample` returns.
+    known : Sample
+
+    Returns
+    -------
+    Solid
+    """
+    from fabfold.solid.load import solid_from_mesh
+    from fabfold.solid.raw import RawMesh
+    from fabfold.solid.tessellate import tessellate
+
+    size = part.bounding_box().size
+    vertices, faces = tessellate(part, max(size.X, size.Y, size.Z))
+    digest = hashlib.sha256(f"sample:{known.name}:{known.version}".encode()).hexdigest()
+    # Rounded, since the kernel's last digits mean nothing and may differ between processors.
+    return solid_from_mesh(known.name, RawMesh(np.round(vertices, 9), faces), digest)

@@ -1,0 +1,1 @@
+"""Search for trees that fold, with many seeds."""

@@ -1,0 +1,219 @@
+"""Seeds in this process, or in worker processes on this machine."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+
+from fabfold.search.seeds import Better, Done, Event, Job, Lost, run_seed
+from fabfold.tree.solve import Candidate
+
+__all__ = ["Here", "Processes"]
+
+#: Seconds that a worker has to end by itself before it is killed.
+PATIENCE = 5.0
+
+
+class Here:
+    """Runs one seed at a time in this process: for debugging, and for small problems.
+
+    Parameters
+    ----------
+    over : callable
+        Polled while a seed runs; True ends it early.
+    """
+
+    def __init__(self, over: Callable[[], bool]) -> None:
+        self._over = over
+        self._next: tuple[Job, int] | None = None
+
+    def free(self) -> int:
+        """Seeds that can be taken now."""
+        return int(self._next is None)
+
+    def submit(self, job: Job, seed: int) -> None:
+        """Take a seed; it runs in :meth:`wait`."""
+        self._next = job, seed
+
+    def wait(self, hear: Callable[[Event], None], seconds: float) -> None:
+        """Run the seed to its end."""
+        if self._next is None:
+            return
+        job, seed = self._next
+
+        def report(candidate: Candidate) -> None:
+            hear(Better(seed, candidate))
+
+        result = run_seed(job, seed, report, self._over)
+        self._next = None
+        hear(Done(seed, result))
+
+    def stop(self) -> None:
+        """Do nothing: the seed polls for itself."""
+
+    def close(self) -> None:
+        """Do nothing: nothing runs."""
+
+
+@dataclass
+class _Worker:
+    process: BaseProcess
+    connection: Connection
+    seed: int | None = None
+
+
+class Processes:
+    """Runs seeds in worker processes on this machine, each started when it is first needed.
+
+    Every worker has a pipe of its own. So a worker that dies, for whatever reason, tells by its
+    pipe which seed it had, and the others do not notice; and workers whose parent dies end too.
+
+    Parameters
+    ----------
+    count : int
+        Most processes at a time.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._workers: list[_Worker] = []
+
+    def free(self) -> int:
+        """Seeds that can be taken now."""
+        return self._count - sum(worker.seed is not None for worker in self._workers)
+
+    def submit(self, job: Job, seed: int) -> None:
+        """Send a seed to an idle worker, or to a new one."""
+        while True:
+            idle = [worker for worker in self._workers if worker.seed is None]
+            worker = idle[0] if idle else self._start()
+            try:
+                worker.connection.send((job, seed))
+            except OSError:  # It died while it had nothing to do.
+                self._drop(worker)
+                if not idle:
+                    raise
+                continue
+            worker.seed = seed
+            return
+
+    def _start(self) -> _Worker:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_serve, args=(theirs,), name="fabfold-seed", daemon=True)
+        with _interrupts_held():
+            process.start()
+        theirs.close()
+        worker = _Worker(process, ours)
+        self._workers.append(worker)
+        return worker
+
+    def _drop(self, worker: _Worker) -> None:
+        self._workers.remove(worker)
+        worker.connection.close()
+        _end(worker.process)
+
+    def wait(self, hear: Callable[[Event], None], seconds: float) -> None:
+        """Tell `hear` what the workers sent, and which of them are gone."""
+        busy = {worker.connection: worker for worker in self._workers if worker.seed is not None}
+        for connection in wait(list(busy), seconds):
+            self._read(busy[connection], hear)  # type: ignore[index]
+
+    def _read(self, worker: _Worker, hear: Callable[[Event], None]) -> None:
+        """Tell what one worker sent; of several better trees only the last counts."""
+        better: Event | None = None
+        end: Event | None = None
+        try:
+            while end is None and worker.connection.poll():
+                event: Event = worker.connection.recv()
+                if isinstance(event, Better):
+                    better = event
+                else:
+                    end = event
+                    worker.seed = None
+        except (EOFError, OSError):
+            assert worker.seed is not None
+            end = Lost(worker.seed)
+            self._drop(worker)
+        for said in (better, end):
+            if said is not None:
+                hear(said)
+
+    def stop(self) -> None:
+        """Ask the seeds that run to end early with what they have."""
+        for worker in self._workers:
+            if worker.seed is not None:
+                try:
+                    worker.connection.send(None)
+                except OSError:
+                    continue  # It is gone; `wait` tells.
+
+    def close(self) -> None:
+        """End all workers; those that run a seed at once."""
+        for worker in self._workers:
+            worker.connection.close()  # An idle worker ends by that.
+            if worker.seed is not None:
+                worker.process.terminate()
+        for worker in self._workers:
+            _end(worker.process)
+        self._workers.clear()
+
+
+def _end(process: BaseProcess) -> None:
+    process.join(PATIENCE)
+    if process.is_alive():
+        process.kill()
+        process.join()
+    process.close()
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C back while a process starts: it comes with the signal blocked, we hear it after.
+
+    Ctrl-C reaches the whole process group; the parent decides what is kept and ends the workers.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _serve(connection: Connection) -> None:
+    """Run seeds as they come, until the parent closes the pipe or is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+    def stop() -> bool:
+        if not connection.poll():
+            return False
+        try:
+            connection.recv()
+        except (EOFError, OSError):
+            os._exit(0)  # Nobody listens any more.
+        return True
+
+    try:
+        while True:
+            message = connection.recv()
+            if message is None:
+                continue  # It came when the seed had just ended.
+            job, seed = message
+
+            def report(candidate: Candidate, seed: int = seed) -> None:
+                connection.send(Better(seed, candidate))
+
+            connection.send(Done(seed, run_seed(job, seed, report, stop)))
+    except (EOFError, OSError):
+        return

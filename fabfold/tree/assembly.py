@@ -1,0 +1,224 @@
+"""From poses to a :class:`~fabfold.tree.system.HingeSystem` and a finished tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.lattice.rotations import ROTATIONS
+from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
+from fabfold.tree.grow import doubles_needed, energy_of
+from fabfold.tree.problem import TreeProblem
+from fabfold.tree.rebuild import COLUMNS, candidates, hinge_rows, rooted, spanning_tree
+from fabfold.tree.sharing import shared_octants, unpacked
+from fabfold.tree.swept_cells import hinge_tables
+from fabfold.tree.system import HingeSystem
+
+__all__ = ["HingeChoice", "SpanningTree", "fold_tree", "hinge_choice"]
+
+
+@dataclass(frozen=True)
+class SpanningTree:
+    """A choice of hinges for a set of poses.
+
+    Attributes
+    ----------
+    system : HingeSystem
+        The bodies and hinges for the folding kernels.
+    joints : (h, 3) int32 array
+        Parent voxel, child voxel and joint type of each hinge; a double hinge has two, one after
+        the other.
+    """
+
+    system: HingeSystem
+    joints: NDArray[np.int32]
+
+    @property
+    def keys(self) -> set[tuple[int, int]]:
+        """Voxel pairs that carry a hinge, smaller voxel first."""
+        return {(min(a, b), max(a, b)) for a, b in self.joints[:, :2].tolist()}
+
+
+@dataclass(frozen=True)
+class HingeChoice:
+    """Rigid clusters of a set of poses and every hinge that could join them.
+
+    Attributes
+    ----------
+    problem : TreeProblem
+    label : (n,) int32 array
+        Cluster of each voxel.
+    clusters : int
+    found : (k, 24) int32 array
+        Possible hinges, see :func:`fabfold.tree.rebuild.candidates`.
+    octants : (n,) uint8 array or None
+        See :func:`fabfold.tree.sharing.shared_octants`.
+    """
+
+    problem: TreeProblem
+    label: NDArray[np.int32]
+    clusters: int
+    found: NDArray[np.int32]
+    octants: NDArray[np.uint8] | None = None
+
+    def wanted(self, keys: set[tuple[int, int]], bonus: float) -> NDArray[np.float64]:
+        """Preference (smaller is sooner) for hinges between the voxel pairs of `keys`."""
+        wanted = np.zeros(len(self.found))
+        for row, (u, v) in enumerate(self.found[:, :2].tolist()):
+            if (u, v) in keys or (v, u) in keys:
+                wanted[row] = -bonus
+        return wanted
+
+    def tree(
+        self, wanted: NDArray[np.float64], generator: NDArray[np.uint64]
+    ) -> SpanningTree | None:
+        """One random spanning tree, or None where the hinges do not join all the clusters."""
+        chosen = np.empty(self.clusters - 1, np.int32)
+        left = spanning_tree(self.found, len(self.found), self.clusters, wanted, generator, chosen)
+        if left > 1:
+            return None
+        hinges = self.clusters - 1 + int(self.found[chosen, 13].sum())
+        body = np.empty(len(self.label), np.int32)
+        parent, joints = np.empty(hinges, np.int32), np.empty((hinges, 3), np.int32)
+        point2 = np.empty((hinges, 3), np.int32)
+        axis, turns = np.empty(hinges, np.int8), np.empty(hinges, np.int8)
+        rooted(
+            self.problem.tables, self.found, chosen, self.label, self.clusters, hinge_tables(),
+            body, parent, point2, axis, turns, joints,
+        )  # fmt: skip
+        system = HingeSystem(
+            cells=self.problem.source,
+            body=body,
+            parent=parent,
+            point2=point2,
+            axis=axis,
+            turns=turns,
+            octants=None if self.octants is None else unpacked(self.octants),
+        )
+        return SpanningTree(system, joints)
+
+
+def hinge_choice(problem: TreeProblem, pose: NDArray[np.int32]) -> HingeChoice:
+    """Clusters and possible hinges of a full set of poses."""
+    label = np.empty(len(problem), np.int32)
+    found = np.empty((hinge_rows(problem.tables), COLUMNS), np.int32)
+    total, rows = candidates(problem.tables, pose, hinge_tables(), label, found)
+    return HingeChoice(problem, label, total, found[:rows], _octants(problem, pose))
+
+
+def _octants(problem: TreeProblem, pose: NDArray[np.int32]) -> NDArray[np.uint8] | None:
+    if problem.tables.shares == 0:
+        return None
+    return shared_octants(pose, problem.tables.mask[:, 0])
+
+
+def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree) -> FoldTree:
+    """The finished tree of a set of poses and a choice of hinges.
+
+    Parameters
+    ----------
+    problem : TreeProblem
+    pose : (n,) int32 array
+        ``24 * template cell + rotation`` of each voxel.
+    tree : SpanningTree
+
+    Returns
+    -------
+    FoldTree
+    """
+    system = tree.system
+    target = problem.template.cells[pose // 24].astype(np.int32)
+    orientation = ROTATIONS[pose % 24]
+    edges = _rigid_edges(problem, pose, system.body)
+    hinges = []
+    holding = set(system.body.tolist())
+    links: dict[int, int] = {}
+    for h, (parent, child, _) in enumerate(tree.joints.tolist()):
+        if h + 1 not in holding:
+            links[h + 1] = len(edges)
+            edges.append(Edge(parent, child, "D", (h, h + 1)))
+        elif int(system.parent[h]) in holding:
+            edges.append(Edge(parent, child, "S", (h,)))
+        direction = [0, 0, 0]
+        direction[int(system.axis[h])] = 1
+        x, y, z = (system.point2[h] / 2.0).tolist()
+        hinges.append(
+            Hinge(
+                name=f"hinge-{h:02d}",
+                parent=int(system.parent[h]),
+                child=h + 1,
+                point=(x, y, z),
+                direction=(direction[0], direction[1], direction[2]),
+                angle_deg=90.0 * int(system.turns[h]),
+            )
+        )
+    first = int(np.flatnonzero(system.body == 0)[0])
+    root = orientation[first]
+    total, clusters = energy_of(problem.tables, pose, problem.empty_face)
+    weights = problem.weights
+    least = weights.single * (clusters - 1)
+    if problem.tables.single + 1 < len(problem.joints):
+        least += (weights.double - weights.single) * int(doubles_needed(problem.tables, pose))
+    singles = sum(edge.kind == "S" for edge in edges)
+    count = weights.single * singles + weights.double * len(links)
+    total += count - least  # a hinge that cannot turn may have made a double one needful
+    weight = weights.surface
+    wished = problem.wished(pose)
+    return FoldTree(
+        template=problem.template,
+        source=problem.source,
+        target=target,
+        orientation=orientation.astype(np.int32),
+        fill=problem.fill,
+        edges=tuple(edges),
+        bodies=_bodies(system, links),
+        hinges=tuple(hinges),
+        root_rotation=root.astype(np.int32),
+        root_translation=(target[first] - root @ problem.source[first]).astype(np.int32),
+        energy={
+            "surface": float((total - count - wished) / weight) if weight else 0.0,
+            "count": float(count),
+            "total": float(total),
+            **({} if problem.bias is None else {"wishes": wished}),
+        },
+        octants=_octants(problem, pose),
+    )
+
+
+def _bodies(system: HingeSystem, links: dict[int, int]) -> tuple[Body, ...]:
+    """Bodies by number; `links` has the edge of each link plate."""
+    out: list[Body] = []
+    for b in range(len(system.parent) + 1):
+        plates = sum(body.edge is not None for body in out)
+        if b in links:
+            out.append(Body(f"link-{plates:02d}", (), links[b]))
+        else:
+            held = tuple(np.flatnonzero(system.body == b).tolist())
+            out.append(Body(f"body-{b - plates:02d}", held))
+    return tuple(out)
+
+
+def _rigid_edges(
+    problem: TreeProblem, pose: NDArray[np.int32], body: NDArray[np.int32]
+) -> list[Edge]:
+    """Spanning forest of the rigid joints, breadth first from each body's first voxel."""
+    tables = problem.tables
+    seen = np.zeros(len(pose), dtype=bool)
+    edges: list[Edge] = []
+    for start in range(len(pose)):
+        if seen[start]:
+            continue
+        seen[start] = True
+        queue = [start]
+        for u in queue:
+            for face in range(6):
+                v = int(tables.neighbour[u, face])
+                if v < 0 or seen[v] or not tables.allowed[u, face, 0] or body[v] != body[u]:
+                    continue
+                if tables.step[face, 0, pose[u]] == pose[v]:
+                    seen[v] = True
+                    queue.append(v)
+                    edges.append(Edge(u, v, "R"))
+    return edges

@@ -1,0 +1,375 @@
+"""Placements of the grid: rotations to try, and how good the cells of a placement are."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabfold.solid.scan import _box_counts
+from fabfold.voxels.offsets import CellEnergy
+
+__all__ = [
+    "MEND_BELOW",
+    "Capacity",
+    "Verdict",
+    "grid_rotations",
+    "judge",
+    "nearby_rotations",
+    "rank_translations",
+]
+
+#: Cells with less material than this may be dropped where a template has no room for their colour.
+MEND_BELOW = 0.15
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """How many cells a template holds: all, and of each checkerboard colour."""
+
+    cells: int
+    colours: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a placement comes to.
+
+    Attributes
+    ----------
+    score : float
+        Total fill of the kept cells, less 0.5 a sliver and `CellEnergy.loss_cost` for each cell's
+        worth of lost material; higher is better.
+    kept : int
+        Cells kept.
+    fill : float
+        Their material, in cells.
+    slivers : int
+        Kept cells under `CellEnergy.sliver_below`.
+    lost : float
+        Material in dropped cells, in cells.
+    excess : int
+        Kept cells for which the template has no cell of their colour.
+    fills : (kept,) float64 array
+        Share of each kept cell that is material, ascending.
+    """
+
+    score: float
+    kept: int
+    fill: float
+    slivers: int
+    lost: float
+    excess: int
+    fills: NDArray[np.float64] = field(repr=False, compare=False)
+
+
+def _from_quaternion(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+    w, x, y, z = (quaternion / np.linalg.norm(quaternion)).tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def grid_rotations(count: int, seed: int, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations of the model against the grid.
+
+    Parameters
+    ----------
+    count : int
+        At least 1.
+    seed : int
+    vertices : (v, 3) float64 array
+        The model, for its principal axes.
+
+    Returns
+    -------
+    (count, 3, 3) float64 array
+        The identity, the model's principal axes, then seeded random ones: every third keeps the
+        model upright (turned about z), the others are uniform over all rotations.
+    """
+    rng = np.random.default_rng([seed, 3])
+    spread = vertices - vertices.mean(axis=0)
+    spread /= max(float(np.abs(spread).max()), 1e-300)
+    # einsum, since a matrix product may sum in an order that depends on the number of threads.
+    axes = np.linalg.eigh(np.einsum("ij,ik->jk", spread, spread))[1].T[::-1]
+    # eigh leaves the signs open: largest entry of each axis positive, and right-handed.
+    axes = axes * np.sign(np.take_along_axis(axes, np.abs(axes).argmax(1)[:, None], 1))
+    axes[2] *= np.sign(np.linalg.det(axes))
+    rotations = [np.eye(3), axes]
+    for index in range(max(0, count - 2)):
+        if index % 3 == 0:
+            half = rng.uniform(0.0, math.pi / 4)
+            rotations.append(_from_quaternion(np.array([math.cos(half), 0, 0, math.sin(half)])))
+        else:
+            rotations.append(_from_quaternion(rng.normal(size=4)))
+    return np.array(rotations[:count])
+
+
+def nearby_rotations(
+    rotations: NDArray[np.float64], count: int, seed: int, spread_deg: float
+) -> NDArray[np.float64]:
+    """Small seeded turns of given rotations, each in its turn.
+
+    Parameters
+    ----------
+    rotations : (r, 3, 3) float64 array
+    count : int
+    seed : int
+    spread_deg : float
+        Standard deviation of the turn about each axis.
+
+    Returns
+    -------
+    (count, 3, 3) float64 array
+    """
+    rng = np.random.default_rng([seed, 4])
+    found = []
+    for index in range(count):
+        half = np.radians(rng.normal(size=3) * spread_deg) / 2
+        small = _from_quaternion(np.concatenate([[1.0], half]))
+        found.append(small @ rotations[index % len(rotations)])
+    return np.array(found).reshape(-1, 3, 3)
+
+
+@njit(cache=True)
+def _keep_largest(keep, fills, stack, labels):  # type: ignore[no-untyped-def]
+    """Clear `keep` everywhere but in the face-connected group with the most material."""
+    nx, ny, nz = keep.shape
+    labels[:] = 0
+    group = 0
+    best_group = 0
+    best_fill = -1.0
+    for start in range(nx * ny * nz):
+        i, j, k = start // (ny * nz), (start // nz) % ny, start % nz
+        if not keep[i, j, k] or labels[i, j, k] != 0:
+            continue
+        group += 1
+        labels[i, j, k] = group
+        stack[0] = start
+        top = 1
+        total = 0.0
+        while top > 0:
+            top -= 1
+            cell = stack[top]
+            i, j, k = cell // (ny * nz), (cell // nz) % ny, cell % nz
+            total += fills[i, j, k]
+            for face in range(6):
+                a, b, c = i, j, k
+                step = 1 if face % 2 == 0 else -1
+                if face < 2:
+                    a += step
+                elif face < 4:
+                    b += step
+                else:
+                    c += step
+                if a < 0 or b < 0 or c < 0 or a >= nx or b >= ny or c >= nz:
+                    continue
+                if keep[a, b, c] and labels[a, b, c] == 0:
+                    labels[a, b, c] = group
+                    stack[top] = (a * ny + b) * nz + c
+                    top += 1
+        if total > best_fill:
+            best_fill = total
+            best_group = group
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(nz):
+                keep[i, j, k] = keep[i, j, k] and labels[i, j, k] == best_group
+
+
+@njit(cache=True)
+def _overfull(keep, colour0, colour1):  # type: ignore[no-untyped-def]
+    """Cells of each colour too many, the better way round, and the number of cells."""
+    nx, ny, nz = keep.shape
+    even = 0
+    odd = 0
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(nz):
+                if keep[i, j, k]:
+                    if (i + j + k) % 2 == 0:
+                        even += 1
+                    else:
+                        odd += 1
+    e0, o0 = max(0, even - colour0), max(0, odd - colour1)
+    e1, o1 = max(0, even - colour1), max(0, odd - colour0)
+    if e0 + o0 <= e1 + o1:
+        return e0, o0, even + odd
+    return e1, o1, even + odd
+
+
+@njit(cache=True)
+def _mend(keep, fills, colour, surplus, below):  # type: ignore[no-untyped-def]
+    """Drop up to `surplus` of the smallest cells of one colour; whether there was one."""
+    nx, ny, nz = fills.shape
+    mended = False
+    for _ in range(surplus):
+        low = below
+        a = b = c = -1
+        for i in range(nx):
+            for j in range(ny):
+                for k in range((colour + i + j) % 2, nz, 2):
+                    if keep[i, j, k] and fills[i, j, k] < low:
+                        low = fills[i, j, k]
+                        a, b, c = i, j, k
+        if a < 0:
+            break
+        keep[a, b, c] = False
+        mended = True
+    return mended
+
+
+@njit(cache=True)
+def _judge(fills, energy, capacity, mend_below, keep, stack, labels):  # type: ignore[no-untyped-def]
+    """Decide which cells stay; (score, kept, fill, slivers, lost, excess)."""
+    share = fills.reshape(-1)
+    kept_share = keep.reshape(-1)
+    total = 0.0
+    count = 0
+    for cell in range(share.size):
+        total += share[cell]
+        kept_share[cell] = share[cell] >= energy[0] and share[cell] > 0.0
+        count += kept_share[cell]
+    if count > 1.5 * capacity[0] + 4:
+        return -1e9, count, total, 0, 0.0, count - capacity[0]
+    for _ in range(4):
+        _keep_largest(keep, fills, stack, labels)
+        even, odd, _kept = _overfull(keep, capacity[1], capacity[2])
+        if even + odd == 0 or even + odd > 4 + capacity[0] // 16:
+            break  # it fits, or is too far from it to be mended
+        mended = _mend(keep, fills, 0, even, mend_below)
+        mended = _mend(keep, fills, 1, odd, mend_below) or mended
+        if not mended:
+            break
+    _keep_largest(keep, fills, stack, labels)
+    even, odd, kept = _overfull(keep, capacity[1], capacity[2])
+    filled = 0.0
+    slivers = 0
+    for cell in range(share.size):
+        if kept_share[cell]:
+            filled += share[cell]
+            slivers += share[cell] < energy[1]
+    lost = total - filled
+    score = filled - energy[2] * slivers - energy[3] * lost
+    return score, kept, filled, slivers, lost, even + odd
+
+
+@njit(cache=True)
+def _rank(table, pitch, steps, energy, capacity, mend_below, excess_cost):  # type: ignore[no-untyped-def]
+    """Verdict on every translation of a grid of `pitch` subvoxels; (steps**3, 4)."""
+    size = np.array([table.shape[0] - 1, table.shape[1] - 1, table.shape[2] - 1])
+    cells = np.zeros(3, dtype=np.int64)
+    for axis in range(3):
+        cells[axis] = math.ceil(size[axis] / pitch) + 1
+    most = cells[0] * cells[1] * cells[2]
+    result = np.zeros((steps**3, 4))
+    keep = np.zeros((cells[0], cells[1], cells[2]), dtype=np.bool_)
+    labels = np.zeros((cells[0], cells[1], cells[2]), dtype=np.int32)
+    stack = np.zeros(most, dtype=np.int64)
+    volume = pitch**3
+    for row in range(steps**3):
+        shift = (row // (steps * steps), (row // steps) % steps, row % steps)
+        xs = np.zeros(cells[0] + 1, dtype=np.int64)
+        ys = np.zeros(cells[1] + 1, dtype=np.int64)
+        zs = np.zeros(cells[2] + 1, dtype=np.int64)
+        for i in range(cells[0] + 1):
+            xs[i] = math.floor((i - shift[0] / steps) * pitch + 0.5)
+        for i in range(cells[1] + 1):
+            ys[i] = math.floor((i - shift[1] / steps) * pitch + 0.5)
+        for i in range(cells[2] + 1):
+            zs[i] = math.floor((i - shift[2] / steps) * pitch + 0.5)
+        fills = _box_counts(table, xs, ys, zs) / volume
+        verdict = _judge(fills, energy, capacity, mend_below, keep, stack, labels)
+        result[row, 0] = verdict[0] - excess_cost * verdict[5]
+        result[row, 1] = verdict[1]
+        result[row, 2] = verdict[5]
+        result[row, 3] = verdict[4] / max(verdict[2] + verdict[4], 1e-300)
+    return result
+
+
+def judge(fills: NDArray[np.float64], energy: CellEnergy, capacity: Capacity) -> Verdict:
+    """Drop what is too small, keep one connected group, and fit the template's colours.
+
+    Parameters
+    ----------
+    fills : (a, b, c) float64 array
+        Share of each cell that is material.
+    energy : CellEnergy
+    capacity : Capacity
+
+    Returns
+    -------
+    Verdict
+        Cells under `MEND_BELOW` are dropped where their colour is over-full; what is still too much
+        is the verdict's `excess`.
+    """
+    keep = np.zeros(fills.shape, dtype=bool)
+    found = _judge(
+        np.ascontiguousarray(fills, dtype=np.float64),
+        energy.arguments(),
+        (capacity.cells, *capacity.colours),
+        MEND_BELOW,
+        keep,
+        np.zeros(fills.size, dtype=np.int64),
+        np.zeros(fills.shape, dtype=np.int32),
+    )
+    score, kept, fill, slivers, lost, excess = found
+    return Verdict(
+        score=float(score),
+        kept=int(kept),
+        fill=float(fill),
+        slivers=int(slivers),
+        lost=float(lost),
+        excess=int(excess),
+        fills=np.sort(fills[keep]),
+    )
+
+
+def rank_translations(
+    table: NDArray[np.int32],
+    pitch: float,
+    steps: int,
+    energy: CellEnergy,
+    capacity: Capacity,
+    excess_cost: float = 1.2,
+) -> NDArray[np.float64]:
+    """Score every translation of a regular grid, without moving planes.
+
+    Parameters
+    ----------
+    table : int32 array
+        From :func:`fabfold.solid.scan.summed_volume`; the model begins at its lower corner.
+    pitch : float
+        Side of a cell in subvoxels.
+    steps : int
+        Translations along each axis: row ``(a * steps + b) * steps + c`` puts the first planes at
+        ``-(a, b, c) / steps`` of a cell.
+    energy : CellEnergy
+    capacity : Capacity
+    excess_cost : float
+        Taken off the score for each cell too many. It is mild, because moving the planes afterwards
+        empties many small cells.
+
+    Returns
+    -------
+    (steps**3, 4) float64 array
+        Score, cells kept, cells too many, and the share of the material that is lost.
+    """
+    return np.asarray(
+        _rank(
+            table,
+            float(pitch),
+            steps,
+            energy.arguments(),
+            (capacity.cells, *capacity.colours),
+            MEND_BELOW,
+            float(excess_cost),
+        )
+    )

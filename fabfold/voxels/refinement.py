@@ -1,0 +1,389 @@
+"""The rounds of the placement search, each on fewer placements and with more care.
+
+Every rotation is scanned coarsely once, and all pitches and translations are read off its summed
+volume table. The best are scanned at 20 x 20 x 20 and get their planes moved; the best of those are
+tried again at pitches in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.lattice.template import Template
+from fabfold.progress import Progress
+from fabfold.solid.closed_solid import Solid
+from fabfold.solid.scan import box_counts, summed_volume
+from fabfold.voxels.cut import Placement
+from fabfold.voxels.grid_placement import (
+    Capacity,
+    Verdict,
+    judge,
+    nearby_rotations,
+    rank_translations,
+)
+from fabfold.voxels.offsets import CellEnergy, Offsets, optimise_offsets
+from fabfold.voxels.voxel_model import SUBDIVISION
+
+__all__ = ["Ranked", "Refinement", "Tried"]
+
+#: Subvoxels along a voxel in the first round.
+_COARSE = 10
+#: Most subvoxels of a scan: a coarse one of a longer model is made coarser, a fine one left out.
+_COARSE_LIMIT = 3_000_000
+_FINE_LIMIT = 40_000_000
+#: Pitches of the second round, in twentieths of the pitch that the first round chose.
+PITCHES = (17, 18, 19, 20, 21)
+#: Pitches of the third round, as shares of the best so far.
+NEARBY = (0.962, 0.975, 0.9875, 1.0125, 1.025)
+#: Taken off the score for a cell too many once the planes are moved: more than a full cell brings.
+_EXCESS_COST = 2.0
+#: Rotations of which small turns are tried, and how small these are.
+_CENTRES = 10
+_SPREAD_DEG = 4.0
+#: Rotations that a search for fewer cells takes over from one for more.
+_AGAIN = 40
+#: Translations along each axis.
+_STEPS = 4
+#: Pitches added at most because they divide a side of the model evenly.
+_MOST_FITTED = 8
+#: Grids of a rotation whose planes are moved in the first round.
+_MOVED = 4
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A placement of the regular grid and its score.
+
+    Attributes
+    ----------
+    score : float
+        See :class:`fabfold.voxels.grid_placement.Verdict`; excess cells are taken off.
+    rotation : int
+        Index of the rotation.
+    pitch : float
+        Side of a voxel, model units.
+    origin : three floats
+        The centre of a cell: lattice axes, model units.
+    """
+
+    score: float
+    rotation: int
+    pitch: float
+    origin: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A placement with its planes moved, and what it comes to."""
+
+    verdict: Verdict
+    rotation: int
+    placement: Placement
+
+    @property
+    def order(self) -> tuple[int, float]:
+        """Sort key: those that fit first, best first; then those that nearly fit."""
+        if self.verdict.excess == 0:
+            return (0, -self.verdict.score)
+        return (1, float(self.verdict.excess))
+
+
+def _shift(row: int) -> NDArray[np.int64]:
+    """Translation steps of a row of :func:`rank_translations`."""
+    return np.array([row // _STEPS**2, row // _STEPS % _STEPS, row % _STEPS])
+
+
+class Refinement:
+    """One search: a model, a template and the rotations to try.
+
+    Parameters
+    ----------
+    solid : Solid
+    template : Template
+    rotations : (r, 3, 3) float64 array
+    energy : CellEnergy
+    limit : int
+        Subvoxels by which a plane may move.
+    """
+
+    def __init__(
+        self,
+        solid: Solid,
+        template: Template,
+        rotations: NDArray[np.float64],
+        energy: CellEnergy,
+        limit: int,
+    ) -> None:
+        self.vertices = np.array(solid.vertices, dtype=np.float64)
+        self.faces = np.array(solid.faces, dtype=np.int32)
+        self.volume = solid.volume
+        self.extent = float(np.ptp(self.vertices, axis=0).max())
+        self.template = template
+        self.capacity = Capacity(len(template), template.colours)
+        self.rotations = rotations
+        #: The rotation that each one is a small turn of; the given ones are their own.
+        self.family = list(range(len(rotations)))
+        self.energy = energy
+        self.limit = limit
+
+    def with_share(self, share: float) -> Refinement:
+        """The same search for a share of the template's cells of each colour."""
+        other = copy(self)
+        even, odd = (int(share * cells) for cells in self.capacity.colours)
+        other.capacity = Capacity(even + odd, (even, odd))
+        return other
+
+    def _coarse(
+        self, rotation: int, side: float
+    ) -> tuple[NDArray[np.int32], float, NDArray[np.float64]]:
+        """Table from the model's lower corner, side of its subvoxels, and that corner."""
+        vertices = self.vertices @ self.rotations[rotation].T
+        low, extent = vertices.min(axis=0), np.ptp(vertices, axis=0)
+        side = max(side, float(np.cbrt(np.prod(extent) / _COARSE_LIMIT)), float(extent.max()) / 512)
+        return summed_volume((vertices - low) / side, self.faces, _shape(extent, side)), side, low
+
+    def pitch_range(self) -> tuple[float, float]:
+        """Smallest and largest pitch that can make sense.
+
+        The smallest has every cell of the template full; or, since a chain of n cells that touch
+        face to face is at most n cells long, has the model just as long. The largest cuts the model
+        into halves, or leaves one cell in twenty full.
+        """
+        full = float(np.cbrt(self.volume / self.capacity.cells))
+        low = max(full, self.extent / (self.capacity.cells + 2))
+        return low, max(low, 2.75 * full, self.extent / 2)
+
+    def pilot(self, max_loss: float, rotations: int = 9) -> tuple[float | None, str]:
+        """A pitch that about fills the template, from the first rotations.
+
+        Returns
+        -------
+        pitch : float or None
+            The median over the rotations of the smallest pitch that fits; None if none does.
+        nearest : str
+            The placement with the least loss, in words.
+        """
+        low, high = self.pitch_range()
+        found = []
+        nearest = (1.0, "no cell with enough material")
+        for index in range(min(rotations, len(self.rotations))):
+            table, side, _ = self._coarse(index, low / 6)
+            best = None
+            pitch = high
+            while pitch >= low:
+                rows = rank_translations(table, pitch / side, 2, self.energy, self.capacity)
+                rows = rows[(rows[:, 2] == 0) & (rows[:, 1] > 0)]
+                if len(rows):
+                    row = rows[np.argmin(rows[:, 3])]
+                    lost = float(row[3])
+                    if lost < nearest[0]:
+                        nearest = (lost, f"{row[1]:.0f} cells with {100 * lost:.0f} % lost")
+                    if lost <= 2 * max_loss:
+                        best = pitch
+                elif best is not None:
+                    break
+                pitch *= 0.97
+            if best is not None:
+                found.append(best)
+        return (float(np.median(found)) if found else None), nearest[1]
+
+    def first(
+        self, pitches: NDArray[np.float64], nearby: int, seed: int, progress: Progress
+    ) -> list[Ranked]:
+        """Rank placements on coarse scans: the best two of each rotation, best first.
+
+        Parameters
+        ----------
+        pitches : (p,) float64 array
+        nearby : int
+            Small turns of the best rotations to go on with; they are added to `rotations`.
+        seed : int
+        progress : Progress
+        """
+        ranked: list[Ranked] = []
+        given = len(self.rotations)
+        count = given + nearby
+        for index in range(count):
+            if index == given:
+                ranked.sort(key=lambda item: -item.score)
+                best = list(dict.fromkeys(item.rotation for item in ranked))[:_CENTRES]
+                turned = nearby_rotations(self.rotations[best], nearby, seed, _SPREAD_DEG)
+                self.rotations = np.concatenate([self.rotations, turned])
+                self.family.extend(best[turn % len(best)] for turn in range(nearby))
+            mine = self._ranked(index, pitches)
+            for pitch in self._fitted(index, pitches):
+                mine.extend(self._ranked(index, np.array([pitch])))
+            mine.sort(key=lambda item: -item.score)
+            ranked.extend(mine[:2])
+            if index % 16 == 15 or index == count - 1:
+                top = max(item.score for item in ranked)
+                progress.update(0.4 * (index + 1) / count, f"{index + 1} rotations, best {top:.1f}")
+        ranked.sort(key=lambda item: -item.score)
+        return ranked
+
+    def again(self, ranked: Sequence[Ranked], pitches: NDArray[np.float64]) -> list[Ranked]:
+        """Rank the rotations that did best in another search: the best grid of each, best first."""
+        best = list(dict.fromkeys(item.rotation for item in ranked))[:_AGAIN]
+        found = [
+            max(self._ranked(rotation, pitches), key=lambda item: item.score) for rotation in best
+        ]
+        return sorted(found, key=lambda item: -item.score)
+
+    def _ranked(self, rotation: int, pitches: NDArray[np.float64]) -> list[Ranked]:
+        """The best grids of one rotation, their planes moved, on one coarse scan."""
+        table, side, low = self._coarse(rotation, float(pitches.min()) / _COARSE)
+        found: list[tuple[float, float, int]] = []
+        for pitch in np.sort(pitches)[::-1].tolist():
+            rows = rank_translations(table, pitch / side, _STEPS, self.energy, self.capacity)
+            best = np.argsort(-rows[:, 0], kind="stable")[:2].tolist()
+            found.extend((float(rows[row, 0]), pitch, row) for row in best)
+            if rows[:, 2].min() > self.capacity.cells / 4:
+                break  # smaller cells are only more
+        found.sort(key=lambda entry: -entry[0])
+        return [
+            self._coarsely_moved(table, side, low, rotation, pitch, row)
+            for _, pitch, row in found[:_MOVED]
+        ]
+
+    def _fitted(self, rotation: int, pitches: NDArray[np.float64]) -> list[float]:
+        """Pitches about as large as `pitches` that divide a side of the model evenly.
+
+        Only for the model's own axes and its principal axes, where they can mean something: a part
+        that is made of equal blocks is then cut between them.
+        """
+        if rotation > 1 or len(pitches) < 2:
+            return []
+        extent = np.ptp(self.vertices @ self.rotations[rotation].T, axis=0)
+        cells = np.arange(1, self.capacity.cells + 1)
+        sides = (extent[:, None] / cells).ravel()
+        low, high = 0.85 * float(pitches.min()), 1.05 * float(pitches.max())
+        within = sides[(sides >= low) & (sides <= high)]
+        return [float(value) for value in np.unique(within)[:_MOST_FITTED]]
+
+    def _coarsely_moved(
+        self,
+        table: NDArray[np.int32],
+        side: float,
+        low: NDArray[np.float64],
+        rotation: int,
+        pitch: float,
+        row: int,
+    ) -> Ranked:
+        """Move the planes on a coarse scan, to foresee what the fine one will come to."""
+        step = pitch / side
+        start = -_shift(row) / _STEPS * step
+        regular = [
+            np.floor(start[axis] + step * np.arange(-1, np.ceil(size / step) + 3) + 0.5).astype(
+                np.int64
+            )
+            for axis, size in enumerate(table.shape)
+        ]
+        limit = int(self.limit / SUBDIVISION * step)
+        moved = optimise_offsets(table, (regular[0], regular[1], regular[2]), limit, self.energy, 3)
+        verdict = self._verdict(table, moved, side, pitch)
+        # The first planes are half a cell before lattice 0.
+        x, y, z = (low + start * side + 0.5 * pitch).tolist()
+        score = verdict.score - _EXCESS_COST * verdict.excess
+        return Ranked(score, rotation, pitch, (x, y, z))
+
+    def _verdict(
+        self, table: NDArray[np.int32], moved: Offsets, side: float, pitch: float
+    ) -> Verdict:
+        """Judge a grid whose planes were moved.
+
+        Its score pays for the moves, and for material that the samples add or miss: flat faces
+        along the grid can be off by half a subvoxel each, all to the same side.
+        """
+        widths = [np.diff(positions).astype(float) for positions in moved.planes]
+        size = widths[0][:, None, None] * widths[1][:, None] * widths[2]
+        verdict = judge(box_counts(table, moved.planes) / size, self.energy, self.capacity)
+        missed = abs(float(table[-1, -1, -1]) * side**3 - self.volume) / pitch**3
+        return replace(verdict, score=verdict.score - missed - moved.effort(self.energy))
+
+    def second(self, item: Ranked, pitches: tuple[int, ...], hold_origin: bool) -> list[Tried]:
+        """Scan a placement at 20 x 20 x 20 and move the planes of several grids near it.
+
+        Parameters
+        ----------
+        item : Ranked
+        pitches : tuple of int
+            In twentieths of its pitch.
+        hold_origin : bool
+            Try no other translation; `pitches` must be ``(20,)``.
+        """
+        rotation = self.rotations[item.rotation]
+        vertices = self.vertices @ rotation.T
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        side = item.pitch / SUBDIVISION
+        # The table begins on a plane of the grid, so that its planes are at whole subvoxels.
+        corner = np.array(item.origin) - 0.5 * item.pitch
+        start = corner + np.floor((low - corner) / item.pitch - 1e-9) * item.pitch
+        shape = _shape(high - start, side)
+        if float(np.prod(np.array(shape, dtype=float))) > _FINE_LIMIT:
+            return []
+        table = summed_volume((vertices - start) / side, self.faces, shape)
+        inside = np.maximum(np.floor((low - start) / side), 0).astype(np.int64)
+        window = np.ascontiguousarray(table[inside[0] :, inside[1] :, inside[2] :])
+        results = []
+        for units in pitches:
+            shifts = [np.zeros(3, dtype=np.int64)] if units == SUBDIVISION else []
+            if not hold_origin:
+                rows = rank_translations(window, units, _STEPS, self.energy, self.capacity)
+                for row in np.argsort(-rows[:, 0], kind="stable")[:2]:
+                    step = np.floor(_shift(int(row)) * (units / _STEPS) + 0.5).astype(np.int64)
+                    if not (units == SUBDIVISION and np.array_equal(step, inside)):
+                        shifts.append(inside - step)
+            for shift in shifts:
+                results.append(self._moved(table, item.rotation, start, side, units, shift))
+        return results
+
+    def _moved(
+        self,
+        table: NDArray[np.int32],
+        rotation: int,
+        start: NDArray[np.float64],
+        side: float,
+        units: int,
+        shift: NDArray[np.int64],
+    ) -> Tried:
+        """Move the planes of the grid of pitch `units` whose first planes are at `shift`."""
+        regular = []
+        for axis in range(3):
+            # One empty cell on each side: the outermost planes stand still, outside the model.
+            count = -(-(table.shape[axis] - 1 - int(shift[axis])) // units)
+            regular.append(shift[axis] + units * np.arange(-1, count + 2, dtype=np.int64))
+        limit = self.limit * units // SUBDIVISION
+        moved = optimise_offsets(table, (regular[0], regular[1], regular[2]), limit, self.energy)
+        pitch = units * side
+        verdict = self._verdict(table, moved, side, pitch)
+        offsets = [moved.offsets[axis] / units for axis in range(3)]
+        placement = Placement(
+            rotation=self.rotations[rotation],
+            origin=start + shift * side + 0.5 * pitch,
+            pitch=pitch,
+            first=np.full(3, -1, dtype=np.int64),
+            offsets=(offsets[0], offsets[1], offsets[2]),
+        )
+        return Tried(verdict, rotation, placement)
+
+    def third(self, tried: Tried) -> list[Tried]:
+        """Try pitches in between, the grid scaled about the model's middle."""
+        placement = tried.placement
+        vertices = self.vertices @ placement.rotation.T
+        middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        found = []
+        for factor in NEARBY:
+            x, y, z = (middle + factor * (placement.origin - middle)).tolist()
+            item = Ranked(0.0, tried.rotation, placement.pitch * factor, (x, y, z))
+            found.extend(self.second(item, (SUBDIVISION,), hold_origin=False))
+        return found
+
+
+def _shape(extent: NDArray[np.float64], side: float) -> tuple[int, int, int]:
+    x, y, z = np.maximum(np.ceil(extent / side), 1).astype(int).tolist()
+    return (x, y, z)

@@ -1,0 +1,1 @@
+"""What a maker may wish for, as terms of the search."""
