@@ -111,14 +111,14 @@ def do_tree(
     from fabfold.kit.kit import Kit
     from fabfold.kit.stage_files import load_options
     from fabfold.search.seeds import Job, run_seed
-    from fabfold.search.warmup import strip_job
+    from fabfold.search.warmup import warm_up_job
     from fabfold.store import StageStore
     from fabfold.tree.starts import grow
 
     kit = Kit.from_model(model, template=name_of(side), seed=seed)
     options = load_options(StageStore(folder / str(side)), files)
     rounds = runs.rounds_of(kit, kit.recipe, options)
-    run_seed(strip_job(), 0, lambda _: None, lambda: False)
+    run_seed(warm_up_job(), 0, lambda _: None, lambda: False)
     notes: dict[str, Any] = {}
     first = rounds._seeds(0)[0]
     found: list[Any] = []

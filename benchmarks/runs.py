@@ -164,17 +164,17 @@ def rounds_of(kit: Any, recipe: Any, options: Sequence[Any] | None = None) -> An
         key="",
         store=StageStore(None),
         workers=1,
-        listening=SilentListener().stage,
+        open_progress=SilentListener().stage,
     )
 
 
 def warm_up(job: Any, joints: Any) -> float:
     """Compile all kernels, or load them from the cache; CPU seconds."""
     from fabfold.search.seeds import run_seed
-    from fabfold.search.warmup import strip_job
+    from fabfold.search.warmup import warm_up_job
 
     start = time.process_time()
-    run_seed(strip_job(joints), 1, lambda _: None, lambda: False)
+    run_seed(warm_up_job(joints), 1, lambda _: None, lambda: False)
     # The real problem may use kernels that the strip does not: two seconds of it, thrown away.
     until = time.process_time() + 2.0
     run_seed(job, 0, lambda _: None, lambda: time.process_time() > until)

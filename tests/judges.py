@@ -18,7 +18,7 @@ class Results:
     def __init__(self):
         self.done, self.better, self.order = {}, {}, []
 
-    def hear(self, event):
+    def on_event(self, event):
         self.order.append((type(event).__name__, event.seed))
         if isinstance(event, Done):
             self.done[event.seed] = event.result

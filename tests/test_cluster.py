@@ -125,7 +125,7 @@ def test_the_answer_is_that_of_this_machine(problem, alone, dask):
         LatticeFoldability(),
         EFFORT,
         scheduler=dask.address,
-        hear=heard.hear,
+        on_event=heard.on_event,
     )
     assert key(found) == key(alone)
     for seed, result in heard.done.items():
@@ -135,7 +135,9 @@ def test_the_answer_is_that_of_this_machine(problem, alone, dask):
 def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alone, dask):
     heard = Results()
     judge = Poisoned(first_question(problem, 1, EFFORT))
-    found = search(problem, range(4), judge, EFFORT, scheduler=dask.address, hear=heard.hear)
+    found = search(
+        problem, range(4), judge, EFFORT, scheduler=dask.address, on_event=heard.on_event
+    )
     assert key(found) == key([c for c in alone if c.seed != 1])
     assert heard.done[1].why == "seed 1 took its worker down 3 times"
 
@@ -148,7 +150,7 @@ def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, dask):
         return len(heard.better) == 2
 
     with executor(None, dask.address, 2, over) as pool:
-        run_seeds(pool, ((seed, job) for seed in range(100)), heard.hear, over)
+        run_seeds(pool, ((seed, job) for seed in range(100)), heard.on_event, over)
     assert sorted(heard.done) == [0, 1]
     for result in heard.done.values():
         assert result.cut == 0.0
@@ -168,7 +170,7 @@ def test_an_interrupted_search_leaves_the_workers_free(problem, alone, dask):
             LatticeFoldability(),
             endless,
             scheduler=dask.address,
-            hear=interrupt,
+            on_event=interrupt,
         )
     found = search(problem, range(4), LatticeFoldability(), EFFORT, scheduler=dask.address)
     assert key(found) == key(alone)
@@ -201,7 +203,9 @@ def test_a_worker_killed_half_way_costs_its_seed_alone(problem, alone, tmp_path)
             while pool.free() < 2:
                 assert time.monotonic() < deadline
                 time.sleep(0.05)
-            run_seeds(pool, ((seed, job) for seed in range(4)), heard.hear, two_run_then_one_dies)
+            run_seeds(
+                pool, ((seed, job) for seed in range(4)), heard.on_event, two_run_then_one_dies
+            )
         assert not any(result.failed for result in heard.done.values())
         found = [c for seed in range(4) for c in heard.done[seed].candidates]
         assert key(sorted(found, key=lambda c: c.energy["total"])) == key(alone)
@@ -248,7 +252,9 @@ def test_a_scheduler_that_goes_away_is_told(problem, tmp_path, monkeypatch):
 
         endless = replace(EFFORT, polishing=10**9)
         with pytest.raises(WorkerError, match="goes on from there"):
-            search(problem, [0], LatticeFoldability(), endless, scheduler=made.address, hear=kill)
+            search(
+                problem, [0], LatticeFoldability(), endless, scheduler=made.address, on_event=kill
+            )
     finally:
         made.close()
 

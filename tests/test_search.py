@@ -49,7 +49,7 @@ def test_the_number_of_workers_changes_nothing(problem, alone):
 
 def test_known_seeds_are_not_searched_again(problem, alone):
     kept = Results()
-    search(problem, [0, 1], LatticeFoldability(), EFFORT, workers=1, hear=kept.hear)
+    search(problem, [0, 1], LatticeFoldability(), EFFORT, workers=1, on_event=kept.on_event)
     assert sorted(kept.done) == [0, 1]
     fresh = Results()
     again = search(
@@ -59,7 +59,7 @@ def test_known_seeds_are_not_searched_again(problem, alone):
         EFFORT,
         workers=1,
         known=kept.done,
-        hear=fresh.hear,
+        on_event=fresh.on_event,
     )
     assert sorted(fresh.done) == [2, 3]
     assert key(again) == key(alone)
@@ -75,7 +75,7 @@ def test_a_killed_worker_costs_nothing(problem, alone, tmp_path):
 def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alone):
     heard = Results()
     judge = Poisoned(first_question(problem, 2, EFFORT))
-    found = search(problem, range(4), judge, EFFORT, workers=2, hear=heard.hear)
+    found = search(problem, range(4), judge, EFFORT, workers=2, on_event=heard.on_event)
     assert key(found) == key([c for c in alone if c.seed != 2])
     assert heard.done[2].failed
     assert heard.done[2].why == "seed 2 took its worker down 3 times"
@@ -86,7 +86,7 @@ def test_a_seed_that_raises_is_left_out_and_the_others_return(problem, alone):
     for workers in (1, 2):
         heard = Results()
         judge = Poisoned(first_question(problem, 1, EFFORT), exits=False)
-        found = search(problem, range(3), judge, EFFORT, workers=workers, hear=heard.hear)
+        found = search(problem, range(3), judge, EFFORT, workers=workers, on_event=heard.on_event)
         assert key(found) == key([c for c in alone if c.seed in (0, 2)])
         assert heard.done[1].failed
         assert "ZeroDivisionError" in heard.done[1].why
@@ -101,7 +101,9 @@ def test_where_every_seed_fails_it_is_said_and_not_taken_for_no_fold(problem):
 def test_better_trees_are_told_of_before_the_seed_ends(problem):
     for workers in (1, 2):
         heard = Results()
-        search(problem, [0, 1], LatticeFoldability(), EFFORT, workers=workers, hear=heard.hear)
+        search(
+            problem, [0, 1], LatticeFoldability(), EFFORT, workers=workers, on_event=heard.on_event
+        )
         for seed, result in heard.done.items():
             told = heard.better[seed]
             assert told[-1].energy["total"] == result.best
@@ -121,7 +123,7 @@ def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, workers)
         return len(heard.better) == workers
 
     with executor(workers, None, workers, over) as pool:
-        run_seeds(pool, ((seed, job) for seed in range(100)), heard.hear, over)
+        run_seeds(pool, ((seed, job) for seed in range(100)), heard.on_event, over)
     assert sorted(heard.done) == list(range(workers))
     for result in heard.done.values():
         assert result.cut == 0.0
@@ -139,7 +141,7 @@ def test_a_worker_that_does_not_hear_is_ended_and_its_last_word_counts(problem, 
         return bool(heard.better)
 
     with executor(2, None, 1, over) as pool:
-        run_seeds(pool, [(0, job)], heard.hear, over)
+        run_seeds(pool, [(0, job)], heard.on_event, over)
     assert heard.done[0].candidates == (heard.better[0][-1],)
     assert heard.done[0].cut == 0.0
     assert not multiprocessing.active_children()
@@ -149,13 +151,13 @@ def test_workers_end_when_their_parent_is_killed():
     code = (
         "import multiprocessing\n"
         "from test_search import *\n"
-        "def hear(event):\n"
+        "def on_event(event):\n"
         "    print(*[p.pid for p in multiprocessing.active_children()], flush=True)\n"
         "if __name__ == '__main__':\n"
         "    problem = solid_problem(strip(8), 'box-2x2x2')\n"
         "    job = Job(problem, LatticeFoldability(), replace(EFFORT, polishing=10**9))\n"
         "    with executor(2, None, 2, lambda: False) as pool:\n"
-        "        run_seeds(pool, [(0, job), (1, job)], hear, lambda: False)\n"
+        "        run_seeds(pool, [(0, job), (1, job)], on_event, lambda: False)\n"
     )
     run = subprocess.Popen(
         [sys.executable, "-c", code],

@@ -332,7 +332,7 @@ def _show_pareto(kit: Kit, stage: str) -> None:
 
 _stage("voxelize", "Cut the model into voxels.")
 _stage("fit", "Find joint trees that carry the voxels into the template and fold.")
-_stage("fold", "Find the folding path of the best tree on the lattice.")
+_stage("fold", "Take the best tree and keep its folding path.")
 _stage("join", "Cut the printed bodies with their hinges, and certify the path on them.")
 _stage("check", "Check the printed bodies and replay the folding.")
 _stage("export", "Make the whole kit: 3MF, STEP, STL, animation and report.")

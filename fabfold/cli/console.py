@@ -26,7 +26,7 @@ _TITLES = {
     "fit": "Finding trees that fold",
     "pareto": "Finding the Pareto list",
     "pictures": "Drawing the solutions",
-    "fold": "Certifying the path",
+    "fold": "Taking the best tree's path",
     "join": "Making bodies and hinges",
     "check": "Checking",
     "export": "Writing the kit",

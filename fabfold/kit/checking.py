@@ -31,9 +31,11 @@ def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
     Parameters
     ----------
     made : Made
+        The tree with its certificate, and its printed bodies.
     profile : Profile
         Limits of the printer and material.
     progress : Progress
+        Hears what is being checked.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from fabfold.recipe.recipe_wishes import wished
 from fabfold.store import stage_key
 from fabfold.version import __version__
 
-__all__ = ["check_key", "join_key", "solid_key", "voxels_key"]
+__all__ = ["check_key", "fold_key", "join_key", "solid_key", "voxels_key"]
 
 
 def solid_key(recipe: Recipe) -> str:
@@ -31,14 +31,15 @@ def voxels_key(recipe: Recipe, template: Template) -> str:
     )
 
 
-def join_key(recipe: Recipe, template: Template, profile: Profile, mark: list[Any]) -> str:
-    """Key of the printed bodies.
+def fold_key(recipe: Recipe, template: Template, mark: list[Any]) -> str:
+    """Key of the best tree and its path.
 
     Parameters
     ----------
     recipe : Recipe
+        Every choice that the kit depends on.
     template : Template
-    profile : Profile
+        The target shape, as it is filled.
     mark : list
         What the rounds add to the recipe, see :meth:`fabfold.search.rounds.Rounds.mark`.
     """
@@ -47,9 +48,22 @@ def join_key(recipe: Recipe, template: Template, profile: Profile, mark: list[An
         voxels_key(recipe, template),
         [recipe.surface_weight, recipe.single_weight, recipe.effort, recipe.rounds],
         *([["wished", *asked], ["pick", recipe.pick]] if asked or recipe.pick else []),
-        recipe.voxel_mm,
-        profile.model_dump(mode="json"),
         mark,
+    )
+
+
+def join_key(recipe: Recipe, template: Template, profile: Profile, mark: list[Any]) -> str:
+    """Key of the printed bodies.
+
+    Parameters
+    ----------
+    recipe, template, mark
+        As of :func:`fold_key`.
+    profile : Profile
+        Printer and material, with the clearance that the recipe asks for.
+    """
+    return stage_key(
+        fold_key(recipe, template, mark), recipe.voxel_mm, profile.model_dump(mode="json")
     )
 
 

@@ -1,6 +1,6 @@
 """A kit: the stages from a model to print-ready files, in memory or in a folder.
 
-Data flows one way, solid → voxels → candidates → motion → joinery → report → files. Each stage is
+Data flows one way: solid → voxels → candidates → attempt → made → checks → files. Each stage is
 a method of :class:`Kit` that runs what is missing before it and returns a typed result. With a
 folder, every finished stage is kept there, and the same recipe goes on from what is done.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -21,7 +22,7 @@ from fabfold.lattice.rotations import rotation_of_degrees
 from fabfold.lattice.template import Template
 from fabfold.progress import Listener, Progress, SilentListener
 from fabfold.recipe.recipe import Recipe
-from fabfold.recipe.start import check_free, start_of
+from fabfold.recipe.start import require_free_folder, set_up_project
 from fabfold.recipe.targets import load_target
 from fabfold.store import StageStore
 
@@ -102,7 +103,7 @@ class Kit:
         if recipe.joints_inside:
             self._template = replace(self._template, joints="inside")
         if folder is not None:
-            check_free(folder)
+            require_free_folder(folder)
 
     @classmethod
     def from_model(
@@ -198,12 +199,25 @@ class Kit:
         return [candidate for _, candidate in next(self._rounds().found())]
 
     def fold(self) -> Attempt:
-        """Best tree with its folding path, planned on the lattice (paper section 5)."""
-        result = self._results.get("fold")
-        if result is None:
-            result = next(self._attempts())
-            self._results["fold"] = result
-        return result
+        """Best tree with the keyframes of its folding path on the lattice (paper section 5).
+
+        Raises
+        ------
+        NoTreeError, NoFoldError
+            If no round of the recipe finds one.
+        """
+        from fabfold.kit.stage_files import load_attempt, save_attempt
+
+        def make(progress: Progress) -> Attempt:
+            attempt = next(self._attempts())
+            hinges, moves = len(attempt.tree.hinges), len(attempt.motion.moves) - 1
+            progress.update(1.0, f"{hinges} hinges, {moves} moves")
+            return attempt
+
+        key = keys.fold_key(self.recipe, self._template, self._mark())
+        if not self._is_done("fold", key):
+            self.fit()  # Ahead of this stage, so that the search shows its own progress.
+        return self._stage("fold", key, make, save_attempt, load_attempt)
 
     def join(self) -> Made:
         """Printed bodies of the best tree that survives on them, with the final certificate.
@@ -216,13 +230,13 @@ class Kit:
         from fabfold.kit.stage_files import load_made, save_made
 
         profile = self.profile()
-        self.fit()
+        best = self.fold()
 
         def make(progress: Progress) -> Made:
             refused: list[str] = []
-            for attempt in self._attempts():
+            for attempt in chain([best], islice(self._attempts(), 1, None)):
                 try:
-                    return self._build(attempt, profile, tuple(refused), progress)
+                    return build(attempt, profile, self.recipe.voxel_mm, tuple(refused), progress)
                 except (GeometryError, CheckError) as error:
                     refused.append(str(error))
                     progress.update(None, f"tree {len(refused)} refused: {error}")
@@ -270,7 +284,7 @@ class Kit:
         target = self.folder if folder is None else Path(folder)
         if target is None:
             raise KitError("where to? Give a folder to export to")
-        check_free(target)
+        require_free_folder(target)
         profile = self.profile()
         made = self.join()
         checks = self.check()
@@ -293,8 +307,9 @@ class Kit:
         from fabfold.kit import writing
 
         if stage == "fit":
-            result = self.fold()
-        if isinstance(result, Attempt):
+            writing.write_tree(self.folder, result[0].tree, self.recipe.voxel_mm)
+            return
+        if stage == "fold":
             writing.write_attempt(self.folder, result, self.recipe.voxel_mm)
             return
         made = self.join()
@@ -335,7 +350,7 @@ class Kit:
             key=keys.voxels_key(self.recipe, self._template),
             store=self._store,
             workers=self.workers,
-            listening=self._listening,
+            open_progress=self._open_progress,
             scheduler=self.scheduler,
             seconds=seconds,
             wishes=self.wishes(),
@@ -374,7 +389,7 @@ class Kit:
 
         if "pareto" not in self._results:
             self._results["pareto"] = solutions(
-                self.recipe, self._rounds_of, self._listening, self.workers, self.scheduler
+                self.recipe, self._rounds_of, self._open_progress, self.workers, self.scheduler
             )
         result: list[Solution] = self._results["pareto"]
         return result
@@ -406,17 +421,16 @@ class Kit:
             for voxels, candidate in pairs:
                 yield Attempt(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
 
-    def _build(
-        self, attempt: Attempt, profile: Profile, refused: tuple[str, ...], progress: Progress
-    ) -> Made:
-        return build(attempt, profile, self.recipe.voxel_mm, refused, progress)
-
-    def _listening(self, name: str) -> AbstractContextManager[Progress]:
+    def _open_progress(self, name: str) -> AbstractContextManager[Progress]:
         """Progress of a stage that is about to be made; the recipe is written before the first."""
         if self.folder is not None:
             write_text(self.folder / "kit.toml", self.recipe.to_toml())
             self._keep_template(self._store)
         return self.listener.stage(name)
+
+    def _is_done(self, name: str, key: str) -> bool:
+        """Whether the result of a stage is in memory or in the kit folder."""
+        return name in self._results or self._store.holds(name, key)
 
     def _stage(
         self,
@@ -430,10 +444,10 @@ class Kit:
         if name in self._results:
             result: Result = self._results[name]
             return result
-        if self._store.holds(name, key):
+        if self._is_done(name, key):
             result = load(self._store, self._store.files(name))
         else:
-            with self._listening(name) as progress:
+            with self._open_progress(name) as progress:
                 result = make(progress)
             if self._store.folder is not None:
                 self._store.record(name, key, save(self._store, result))
@@ -455,11 +469,15 @@ def open_kit(
     Parameters
     ----------
     source : str
+        Path of a model, a recipe or a kit folder; or ``sample:NAME``.
     folder : Path or None
         Kit folder; for a kit folder or its ``kit.toml`` the default is that folder.
     workers : int or None
+        Processes of the search; None takes one a core. Changes no result.
     scheduler : str or None
+        Address of a Dask scheduler, whose workers search instead. Changes no result.
     seconds : float or None
+        Search for so long and take the best; depends on the speed of the machine.
     **options
         Fields of the recipe; those that are None keep the recipe's or the default value.
 
@@ -470,7 +488,7 @@ def open_kit(
     RecipeError
         If the recipe or an option is wrong.
     """
-    start = start_of(source, folder, options)
+    start = set_up_project(source, folder, options)
     return Kit(
         start.recipe,
         model=start.model,

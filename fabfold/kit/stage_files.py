@@ -20,10 +20,12 @@ from fabfold.voxels.voxel_files import load_voxels, save_voxels
 from fabfold.voxels.voxel_model import Voxels
 
 __all__ = [
+    "load_attempt",
     "load_checks",
     "load_made",
     "load_options",
     "load_solid",
+    "save_attempt",
     "save_checks",
     "save_made",
     "save_options",
@@ -68,6 +70,29 @@ def save_options(store: StageStore, options: list[Voxels]) -> list[str]:
 def load_options(store: StageStore, files: list[str]) -> list[Voxels]:
     """Read what :func:`save_options` wrote."""
     return [load_voxels(store.path(name)) for name in files]
+
+
+def save_attempt(store: StageStore, attempt: Attempt) -> list[str]:
+    """Write the best tree, its voxels and its path on the lattice."""
+    content = {
+        "format": "fabfold-fold",
+        "version": 1,
+        "tree": attempt.tree.to_json(1.0, (0.0, 0.0, 0.0)),
+        "motion": attempt.motion.to_json(),
+    }
+    write_json(store.path("fold.json"), content)
+    save_voxels(store.path("fold-voxels.npz"), attempt.voxels)
+    return ["fold.json", "fold-voxels.npz"]
+
+
+def load_attempt(store: StageStore, files: list[str]) -> Attempt:
+    """Read what :func:`save_attempt` wrote."""
+    data = json.loads(store.path("fold.json").read_text(encoding="utf-8"))
+    return Attempt(
+        load_voxels(store.path("fold-voxels.npz")),
+        FoldTree.from_json(data["tree"]),
+        Motion.from_json(data["motion"]),
+    )
 
 
 def save_made(store: StageStore, made: Made) -> list[str]:

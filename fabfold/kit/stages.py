@@ -57,6 +57,7 @@ def build(
     Parameters
     ----------
     attempt : Attempt
+        The tree, its voxels and its path on the lattice.
     profile : Profile
         Clearance of the hinges, and the gap to certify.
     voxel_mm : float
@@ -64,6 +65,7 @@ def build(
     refused : tuple of str
         Why each better-ranked tree was passed over.
     progress : Progress
+        Hears which body is cut and which move is proven.
 
     Raises
     ------

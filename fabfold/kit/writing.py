@@ -24,6 +24,7 @@ from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
 from fabfold.search.pareto import Solution
 from fabfold.solid.closed_solid import Solid
+from fabfold.tree.fold_tree import FoldTree
 from fabfold.version import __version__
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "write_kit",
     "write_made",
     "write_pareto",
+    "write_tree",
 ]
 
 
@@ -70,9 +72,15 @@ def kit_summary(solid: Solid, made: Made, wishes: Sequence[dict[str, Any]] = ())
     }
 
 
+def write_tree(folder: Path, tree: FoldTree, voxel_mm: float) -> None:
+    """Write ``tree.json`` of a tree that is not built yet; another tree's motion goes."""
+    (folder / "motion.json").unlink(missing_ok=True)
+    write_json(folder / "tree.json", tree.to_json(voxel_mm, (0.0, 0.0, 0.0)))
+
+
 def write_attempt(folder: Path, attempt: Attempt, voxel_mm: float) -> None:
     """Write ``tree.json`` and ``motion.json`` of a tree that is not built yet."""
-    write_json(folder / "tree.json", attempt.tree.to_json(voxel_mm, (0.0, 0.0, 0.0)))
+    write_tree(folder, attempt.tree, voxel_mm)
     write_json(folder / "motion.json", attempt.motion.to_json())
 
 
@@ -126,11 +134,17 @@ def write_kit(
     folder : Path
         Made where it is missing; files of an older export are replaced one by one.
     recipe : Recipe
+        Written as ``kit.toml``; names the files.
     profile : Profile
+        Printer and material, named in the 3MF.
     solid : Solid
+        The model; its repairs are told in the report.
     made : Made
+        Tree, motion with certificate, and printed bodies.
     checks : list of Check
+        Every check, passed or failed.
     progress : Progress
+        Hears which file is written.
     wishes : sequence of dict
         What became of each wish.
     template : Template, optional

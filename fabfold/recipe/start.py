@@ -12,19 +12,20 @@ from fabfold.files import sha256_of
 from fabfold.recipe.recipe import Recipe, make_recipe, read_recipe
 from fabfold.recipe.targets import find_input, is_file_name, named_target
 
-__all__ = ["Start", "check_free", "start_of"]
+__all__ = ["ProjectSetup", "require_free_folder", "set_up_project"]
 
 #: Target of a model that says nothing of its own.
 _USUAL = "box-4x4x4"
 
 
 @dataclass(frozen=True)
-class Start:
+class ProjectSetup:
     """What a kit starts from.
 
     Attributes
     ----------
     recipe : Recipe
+        Every choice, after defaults.
     model : Path or None
         The model's file; None for a sample.
     template : Path or None
@@ -39,12 +40,13 @@ class Start:
     folder: Path | None
 
 
-def start_of(source: str, folder: Path | None, options: Mapping[str, Any]) -> Start:
+def set_up_project(source: str, folder: Path | None, options: Mapping[str, Any]) -> ProjectSetup:
     """Recipe and files of a model file, ``sample:NAME``, a ``kit.toml`` or a kit folder.
 
     Parameters
     ----------
     source : str
+        Path of a model, a recipe or a kit folder; or ``sample:NAME``.
     folder : Path or None
         Kit folder; for a kit folder or its ``kit.toml`` the default is that folder.
     options : mapping
@@ -70,20 +72,22 @@ def start_of(source: str, folder: Path | None, options: Mapping[str, Any]) -> St
             raise KitError(f"{path}: a folder without kit.toml is no kit; give a model file")
         path = path / "kit.toml"
     if path.suffix == ".toml":
-        return _of_recipe(path, path.parent if folder is None else folder, given, template)
+        return _from_recipe(path, path.parent if folder is None else folder, given, template)
     if source.startswith("sample:"):
         from fabfold.samples.catalogue import sample
 
         given.setdefault("template", sample(source.removeprefix("sample:")).template)
-        return Start(make_recipe(model=source, **given), None, template, folder)
+        return ProjectSetup(make_recipe(model=source, **given), None, template, folder)
     if not path.is_file():
         raise ModelError(f"{source}: no such file (built-in samples are written sample:NAME)")
     given.setdefault("template", _USUAL)
     recipe = make_recipe(model=path.name, sha256=sha256_of(path), **given)
-    return Start(recipe, path, template, folder)
+    return ProjectSetup(recipe, path, template, folder)
 
 
-def _of_recipe(path: Path, folder: Path, given: dict[str, Any], template: Path | None) -> Start:
+def _from_recipe(
+    path: Path, folder: Path, given: dict[str, Any], template: Path | None
+) -> ProjectSetup:
     """A written recipe with some of its fields changed."""
     recipe = read_recipe(path)
     if template is None and "template" not in given and is_file_name(recipe.template):
@@ -95,10 +99,10 @@ def _of_recipe(path: Path, folder: Path, given: dict[str, Any], template: Path |
     model: Path | None = None
     if not recipe.model.startswith("sample:"):
         model = find_input(recipe.model, recipe.sha256, path.parent, "model")
-    return Start(recipe, model, template, folder)
+    return ProjectSetup(recipe, model, template, folder)
 
 
-def check_free(folder: Path) -> None:
+def require_free_folder(folder: Path) -> None:
     """Refuse a folder that holds something that is no kit.
 
     Raises

@@ -74,6 +74,7 @@ def find_input(name: str, sha256: str, beside: Path, kept: str) -> Path:
     Parameters
     ----------
     name : str
+        File name, as the recipe has it.
     sha256 : str
         Its digest; empty where the recipe was written by hand and any content will do.
     beside : Path

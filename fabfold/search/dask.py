@@ -26,7 +26,7 @@ from fabfold.search.dask_worker import unpacked
 from fabfold.search.seeds import Done, Event, Job, Lost
 from fabfold.version import __version__
 
-__all__ = ["Cluster", "check_address"]
+__all__ = ["DaskExecutor", "check_address"]
 
 #: Seconds to reach the scheduler, and to get an answer from it or a worker.
 CONNECT = 10.0
@@ -45,7 +45,7 @@ class _Running:
     identity: str
 
 
-class Cluster:
+class DaskExecutor:
     """Runs seeds on the workers of a Dask scheduler.
 
     Parameters
@@ -64,8 +64,8 @@ class Cluster:
         self._address = address
         self._client = _connect(address)
         self._topic = f"fabfold-{self._client.id}"
-        self._heard: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
-        self._client.subscribe_topic(self._topic, lambda event: self._heard.put(("better", event)))
+        self._events: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
+        self._client.subscribe_topic(self._topic, lambda event: self._events.put(("better", event)))
         self._running: dict[str, _Running] = {}
         self._numbers = itertools.count()
         self._payload: tuple[Job, bytes] | None = None
@@ -180,7 +180,7 @@ class Cluster:
             pure=False,
         )
         self._running[key] = _Running(seed, future, worker, self._workers[worker])
-        future.add_done_callback(lambda future: self._heard.put(("ended", future.key)))
+        future.add_done_callback(lambda future: self._events.put(("ended", future.key)))
 
     def _packed(self, job: Job) -> bytes:
         import cloudpickle
@@ -189,19 +189,19 @@ class Cluster:
             self._payload = job, zlib.compress(cloudpickle.dumps(job), 1)
         return self._payload[1]
 
-    def wait(self, hear: Callable[[Event], None], seconds: float) -> None:
-        """Tell `hear` what the workers sent, and which of them are gone."""
+    def wait(self, on_event: Callable[[Event], None], seconds: float) -> None:
+        """Hand on to `on_event` what the workers sent, and which of them are gone."""
         for kind, content in self._news(seconds):
             if kind == "better":
-                hear(unpacked(content))
+                on_event(unpacked(content))
             elif content in self._running:
-                hear(self._ended(content))
+                on_event(self._ended(content))
         self._look()
         for key, run in list(self._running.items()):
             if self._workers.get(run.worker) != run.identity:
                 del self._running[key]
                 run.future.cancel()
-                hear(Lost(run.seed))
+                on_event(Lost(run.seed))
         if not self._workers and time.monotonic() - self._last_seen > PATIENCE:
             raise WorkerError(
                 f"the scheduler {self._address} has no worker left; what is done is kept: start "
@@ -211,9 +211,9 @@ class Cluster:
     def _news(self, seconds: float) -> list[tuple[str, Any]]:
         news: list[tuple[str, Any]] = []
         try:
-            news.append(self._heard.get(timeout=seconds))
+            news.append(self._events.get(timeout=seconds))
             while True:
-                news.append(self._heard.get_nowait())
+                news.append(self._events.get_nowait())
         except queue.Empty:
             return news
 

@@ -34,6 +34,7 @@ def run_payload(payload: bytes, seed: int, topic: str) -> bytes:
     payload : bytes
         Compressed pickle of a :class:`~fabfold.search.seeds.Job`.
     seed : int
+        Seed of every random choice of this task.
     topic : str
         Where better trees are told, and the name under which the search is stopped.
 

@@ -39,7 +39,9 @@ class Solution:
     Attributes
     ----------
     voxels : Voxels
+        The voxelization that the tree joins.
     candidate : Candidate
+        The tree, its path and its energy.
     prefer : float
         Step of the ladder that found it.
     joints : int
@@ -99,7 +101,7 @@ def undominated(found: Sequence[Solution]) -> list[Solution]:
 def solutions(
     recipe: Recipe,
     rounds_of: Callable[[Recipe, int], Rounds],
-    listening: Callable[[str], AbstractContextManager[Progress]],
+    open_progress: Callable[[str], AbstractContextManager[Progress]],
     workers: int | None,
     scheduler: str | None,
 ) -> list[Solution]:
@@ -111,7 +113,7 @@ def solutions(
         Its own `prefer` counts for nothing here.
     rounds_of : callable
         Makes the search of a recipe whose seeds are shifted by a number.
-    listening : callable
+    open_progress : callable
         Opens the progress of a stage by its name.
     workers, scheduler
         See :func:`fabfold.search.run.executor`.
@@ -133,7 +135,7 @@ def solutions(
 
     most = min(recipe.rounds, _STEP // SEEDS_PER_ROUND)
     for number in range(most):
-        found, fitted, reason = _round(ladder, number, listening, workers, scheduler)
+        found, fitted, reason = _round(ladder, number, open_progress, workers, scheduler)
         fits, why = fits or fitted, why or reason
         if found:
             return undominated(found)
@@ -164,7 +166,7 @@ def picked(found: Sequence[Solution], number: int) -> Solution:
 def _round(
     ladder: Sequence[Rounds],
     number: int,
-    listening: Callable[[str], AbstractContextManager[Progress]],
+    open_progress: Callable[[str], AbstractContextManager[Progress]],
     workers: int | None,
     scheduler: str | None,
 ) -> tuple[list[Solution], bool, str]:
@@ -179,17 +181,17 @@ def _round(
                 if seed not in results:
                     yield seed, ladder[step].job(seed)
 
-        with listening(f"pareto-{number}") as progress:
+        with open_progress(f"pareto-{number}") as progress:
             tally = Tally(progress, results, lambda done: done / len(owner), len(owner))
 
-            def hear(event: Event) -> None:
+            def on_event(event: Event) -> None:
                 step = owner[event.seed]
                 ladder[step].keep(event, batches[step].keys[event.seed])
-                tally.hear(event)
+                tally.on_event(event)
 
             forever = Budget()
             with executor(workers, scheduler, len(owner), forever.over) as pool:
-                run_seeds(pool, tasks(), hear, forever.over)
+                run_seeds(pool, tasks(), on_event, forever.over)
             tally.check_failures()
             results = tally.results
     found = []

@@ -15,13 +15,13 @@ from multiprocessing.process import BaseProcess
 from fabfold.search.seeds import Better, Done, Event, Job, Lost, run_seed
 from fabfold.tree.solve import Candidate
 
-__all__ = ["Here", "Processes"]
+__all__ = ["InProcessExecutor", "ProcessExecutor"]
 
 #: Seconds that a worker has to end by itself before it is killed.
 PATIENCE = 5.0
 
 
-class Here:
+class InProcessExecutor:
     """Runs one seed at a time in this process: for debugging, and for small problems.
 
     Parameters
@@ -42,18 +42,18 @@ class Here:
         """Take a seed; it runs in :meth:`wait`."""
         self._next = job, seed
 
-    def wait(self, hear: Callable[[Event], None], seconds: float) -> None:
+    def wait(self, on_event: Callable[[Event], None], seconds: float) -> None:
         """Run the seed to its end."""
         if self._next is None:
             return
         job, seed = self._next
 
         def report(candidate: Candidate) -> None:
-            hear(Better(seed, candidate))
+            on_event(Better(seed, candidate))
 
         result = run_seed(job, seed, report, self._over)
         self._next = None
-        hear(Done(seed, result))
+        on_event(Done(seed, result))
 
     def stop(self) -> None:
         """Do nothing: the seed polls for itself."""
@@ -69,7 +69,7 @@ class _Worker:
     seed: int | None = None
 
 
-class Processes:
+class ProcessExecutor:
     """Runs seeds in worker processes on this machine, each started when it is first needed.
 
     Every worker has a pipe of its own. So a worker that dies, for whatever reason, tells by its
@@ -120,14 +120,14 @@ class Processes:
         worker.connection.close()
         _end(worker.process)
 
-    def wait(self, hear: Callable[[Event], None], seconds: float) -> None:
-        """Tell `hear` what the workers sent, and which of them are gone."""
+    def wait(self, on_event: Callable[[Event], None], seconds: float) -> None:
+        """Hand on to `on_event` what the workers sent, and which of them are gone."""
         busy = {worker.connection: worker for worker in self._workers if worker.seed is not None}
         for connection in wait(list(busy), seconds):
-            self._read(busy[connection], hear)  # type: ignore[index]
+            self._read(busy[connection], on_event)  # type: ignore[index]
 
-    def _read(self, worker: _Worker, hear: Callable[[Event], None]) -> None:
-        """Tell what one worker sent; of several better trees only the last counts."""
+    def _read(self, worker: _Worker, on_event: Callable[[Event], None]) -> None:
+        """Hand on what one worker sent; of several better trees only the last counts."""
         better: Event | None = None
         end: Event | None = None
         try:
@@ -142,9 +142,9 @@ class Processes:
             assert worker.seed is not None
             end = Lost(worker.seed)
             self._drop(worker)
-        for said in (better, end):
-            if said is not None:
-                hear(said)
+        for last in (better, end):
+            if last is not None:
+                on_event(last)
 
     def stop(self) -> None:
         """Ask the seeds that run to end early with what they have."""
@@ -176,7 +176,7 @@ def _end(process: BaseProcess) -> None:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back while a process starts: it comes with the signal blocked, we hear it after.
+    """Hold Ctrl-C back while a process starts: it comes with the signal blocked, we get it after.
 
     Ctrl-C reaches the whole process group; the parent decides what is kept and ends the workers.
     """

@@ -116,14 +116,18 @@ class Rounds:
     Parameters
     ----------
     recipe : Recipe
+        Weights, effort, joints and seed of the search.
     template : Template
+        The target shape, as it is filled.
     options : sequence of Voxels
         Voxelizations; each seed searches the next one, see :func:`search_order`.
     key : str
         Digest of all that `options` depend on.
     store : StageStore
+        Where finished seeds are kept.
     workers : int or None
-    listening : callable
+        Processes of the search; None is one a core.
+    open_progress : callable
         Opens the progress of a round by its name.
     scheduler : str or None
         Address of a Dask scheduler whose workers run the seeds.
@@ -145,7 +149,7 @@ class Rounds:
         key: str,
         store: StageStore,
         workers: int | None,
-        listening: Callable[[str], AbstractContextManager[Progress]],
+        open_progress: Callable[[str], AbstractContextManager[Progress]],
         scheduler: str | None = None,
         seconds: float | None = None,
         wishes: Wishes | None = None,
@@ -161,7 +165,7 @@ class Rounds:
         self.seconds = seconds
         self._key = key
         self._cache = SeedCache(store)
-        self._listening = listening
+        self._open_progress = open_progress
         self._jobs: dict[int, Job | SeedResult] = {}
         self._done: dict[int, list[Found]] = {}
         self._ranked: list[Found] | None = None
@@ -271,18 +275,18 @@ class Rounds:
 
         if seconds <= 0:
             return known
-        with self._listening("fit") as progress:
+        with self._open_progress("fit") as progress:
             budget = Budget(seconds)
             tally = Tally(progress, known, lambda _done: budget.share)
             with executor(self.workers, self.scheduler, rounds, budget.over) as pool:
 
-                def hear(event: Event) -> None:
-                    tally.hear(self._cache.keep(event, keys[event.seed], seconds))
+                def on_event(event: Event) -> None:
+                    tally.on_event(self._cache.keep(event, keys[event.seed], seconds))
 
                 progress.update(None, "getting ready")
                 warm_up(pool, self.recipe.joints)
                 budget.restart()
-                run_seeds(pool, tasks(), hear, budget.over)
+                run_seeds(pool, tasks(), on_event, budget.over)
         tally.check_failures()
         return tally.results
 
@@ -321,23 +325,23 @@ class Rounds:
         return Batch(keys, whole)
 
     def keep(self, event: Event, key: str) -> None:
-        """Keep what a seed of a batch tells."""
+        """Keep what a seed of a batch found."""
         self._cache.keep(event, key)
 
     def job(self, seed: int) -> Job | SeedResult:
         """What a seed searches, or its result where its voxelization rules every tree out."""
         if self.template.creases:
-            return self._made(seed)  # the faces of the parts depend on the seed
+            return self._job_of(seed)  # the faces of the parts depend on the seed
         option = self._option(seed)
         if option not in self._jobs:
-            self._jobs[option] = self._made(seed)
+            self._jobs[option] = self._job_of(seed)
         job = self._jobs[option]
         if isinstance(job, Job) and self._carves((seed - self._seeds(0)[0]) // SEEDS_PER_ROUND):
             judge = LatticeFoldability(carve=CORE, material=self.voxels(seed).subvoxels)
             return replace(job, foldability=judge)
         return job
 
-    def _made(self, seed: int) -> Job | SeedResult:
+    def _job_of(self, seed: int) -> Job | SeedResult:
         voxels = self.voxels(seed)
         joints = features(voxels)
         uncut = self.wishes.uncut(voxels, joints, self.template)
@@ -374,18 +378,18 @@ class Rounds:
             seed: result for seed, result in self._cache.known(keys).items() if result.cut is None
         }
 
-        def hear(event: Event) -> None:
+        def on_event(event: Event) -> None:
             self._cache.keep(event, keys[event.seed])
 
         if len(results) < len(keys):
-            with self._listening(f"fit-{number}") as progress:
+            with self._open_progress(f"fit-{number}") as progress:
                 results = search_tasks(
                     {seed: self.job(seed) for seed in keys},
                     workers=self.workers,
                     scheduler=self.scheduler,
                     progress=progress,
                     known=results,
-                    hear=hear,
+                    on_event=on_event,
                 )
         require_fit([results[seed] for seed in keys])
         self._done[number] = self._paired(results)

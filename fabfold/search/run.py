@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from fabfold.errors import NoTreeError, RecipeError, WorkerError
 from fabfold.progress import Progress, SilentProgress
 from fabfold.search.seeds import Better, Done, Event, Executor, Job, SeedResult
-from fabfold.search.warmup import strip_job
+from fabfold.search.warmup import warm_up_job
 from fabfold.tree.catalogue import JointSet
 from fabfold.tree.effort import Effort
 from fabfold.tree.foldability import Foldability
@@ -101,17 +101,17 @@ def executor(
     if workers is not None and workers < 1:
         raise RecipeError(f"--workers {workers}: there must be at least one")
     if scheduler is not None:
-        from fabfold.search.dask import Cluster
+        from fabfold.search.dask import DaskExecutor
 
-        opened = Cluster(scheduler)
+        opened = DaskExecutor(scheduler)
     elif workers == 1:
-        from fabfold.search.processes import Here
+        from fabfold.search.processes import InProcessExecutor
 
-        opened = Here(over)
+        opened = InProcessExecutor(over)
     else:
-        from fabfold.search.processes import Processes
+        from fabfold.search.processes import ProcessExecutor
 
-        opened = Processes(min(workers or os.cpu_count() or 1, max(1, seeds)))
+        opened = ProcessExecutor(min(workers or os.cpu_count() or 1, max(1, seeds)))
     try:
         yield opened
     finally:
@@ -121,21 +121,22 @@ def executor(
 def run_seeds(
     pool: Executor,
     tasks: Iterable[tuple[int, Job | SeedResult]],
-    hear: Callable[[Event], None],
+    on_event: Callable[[Event], None],
     over: Callable[[], bool],
 ) -> None:
     """Run seeds until all have ended, or `over` says so.
 
     A seed whose worker dies is tried again, and left out after `TRIES` workers; the others do not
     notice. Seeds that run when it is over end early; those that do not end in time are given up,
-    and what they had told counts.
+    and the better trees that they had reported count.
 
     Parameters
     ----------
     pool : Executor
+        What runs the seeds.
     tasks : iterable of (int, Job or SeedResult)
         Taken as workers become free; may be endless. Where there is nothing to search, the result.
-    hear : callable
+    on_event : callable
         Told of each :class:`Better` and each :class:`Done`.
     over : callable
         Polled often.
@@ -146,15 +147,15 @@ def run_seeds(
     best: dict[int, Candidate] = {}
     losses: Counter[int] = Counter()
 
-    def sift(event: Event) -> None:
+    def take(event: Event) -> None:
         if event.seed not in running:
             return
         if isinstance(event, Better):
             best[event.seed] = event.candidate
-            hear(event)
+            on_event(event)
         elif isinstance(event, Done):
             del running[event.seed]
-            hear(event)
+            on_event(event)
         else:
             job = running.pop(event.seed)
             losses[event.seed] += 1
@@ -162,31 +163,31 @@ def run_seeds(
                 again.append((event.seed, job))
             else:
                 why = f"seed {event.seed} took its worker down {TRIES} times"
-                hear(Done(event.seed, SeedResult((), why=why, failed=True)))
+                on_event(Done(event.seed, SeedResult((), why=why, failed=True)))
 
-    told: Budget | None = None
+    grace: Budget | None = None
     while True:
-        if told is None and over():
+        if grace is None and over():
             pool.stop()
-            told = Budget(GRACE)
-        while told is None and pool.free() > 0:
+            grace = Budget(GRACE)
+        while grace is None and pool.free() > 0:
             task = again.pop(0) if again else next(waiting, None)
             if task is None:
                 break
             seed, job = task
             if isinstance(job, SeedResult):
-                hear(Done(seed, job))
+                on_event(Done(seed, job))
                 continue
             running[seed] = job
             pool.submit(job, seed)
-        if not running and (told is not None or not again):
+        if not running and (grace is not None or not again):
             break
-        if told is not None and told.over():
+        if grace is not None and grace.over():
             break
-        pool.wait(sift, TICK)
+        pool.wait(take, TICK)
     for seed in [*running, *(seed for seed, _ in again)]:
         found = (best[seed],) if seed in best else ()
-        hear(Done(seed, SeedResult(found, why="no time left", cut=0.0)))
+        on_event(Done(seed, SeedResult(found, why="no time left", cut=0.0)))
 
 
 def warm_up(pool: Executor, joints: JointSet = "S") -> None:
@@ -194,17 +195,18 @@ def warm_up(pool: Executor, joints: JointSet = "S") -> None:
 
     After an installation that takes a minute, for they are compiled first; later a second.
     """
-    job = strip_job(joints)
+    job = warm_up_job(joints)
     forever = Budget()
     run_seeds(pool, [(seed, job) for seed in range(pool.free())], lambda _event: None, forever.over)
 
 
 class Tally:
-    """Results so far, and the line of progress that tells of them.
+    """Results so far, and the line of progress that shows them.
 
     Parameters
     ----------
     progress : Progress
+        Shows the line.
     known : mapping of int to SeedResult
         Seeds that are done already.
     share : callable
@@ -227,9 +229,9 @@ class Tally:
             default=None,
         )
         self._progress, self._share, self._total = progress, share, total
-        self.tell()
+        self.show()
 
-    def hear(self, event: Event) -> None:
+    def on_event(self, event: Event) -> None:
         """Count an event in."""
         found: Sequence[Candidate] = ()
         if isinstance(event, Better):
@@ -240,10 +242,10 @@ class Tally:
         for candidate in found:
             if self.best is None or candidate.energy["total"] < self.best.energy["total"]:
                 self.best = candidate
-        self.tell()
+        self.show()
 
-    def tell(self) -> None:
-        """Tell the progress how far it is."""
+    def show(self) -> None:
+        """Show how far the search is, and its best tree."""
         done = len(self.results)
         text = f"{done} seeds" if self._total is None else f"{done} of {self._total} seeds"
         if self.best is not None:
@@ -274,7 +276,7 @@ def search_tasks(
     scheduler: str | None = None,
     progress: Progress | None = None,
     known: Mapping[int, SeedResult] | None = None,
-    hear: Callable[[Event], None] | None = None,
+    on_event: Callable[[Event], None] | None = None,
 ) -> dict[int, SeedResult]:
     """Results of all seeds.
 
@@ -291,7 +293,7 @@ def search_tasks(
         Hears of each finished seed and the best so far.
     known : mapping of int to SeedResult, optional
         Seeds that are done already.
-    hear : callable, optional
+    on_event : callable, optional
         Told of each better tree, and of each seed that ends, so that they can be kept.
 
     Raises
@@ -307,9 +309,9 @@ def search_tasks(
     if todo:
 
         def each(event: Event) -> None:
-            if hear is not None:
-                hear(event)
-            tally.hear(event)
+            if on_event is not None:
+                on_event(event)
+            tally.on_event(event)
 
         forever = Budget()
         with executor(workers, scheduler, len(todo), forever.over) as pool:
@@ -328,17 +330,21 @@ def search(
     scheduler: str | None = None,
     progress: Progress | None = None,
     known: Mapping[int, SeedResult] | None = None,
-    hear: Callable[[Event], None] | None = None,
+    on_event: Callable[[Event], None] | None = None,
 ) -> list[Candidate]:
     """Trees that fold from all seeds of one problem, best first.
 
     Parameters
     ----------
     problem : TreeProblem
+        Voxels, template and joints as arrays.
     seeds : sequence of int
+        Each is a search of its own.
     foldability : Foldability
+        Tells which trees fold, and how.
     effort : Effort
-    workers, scheduler, progress, known, hear
+        How long each seed may try, in counts.
+    workers, scheduler, progress, known, on_event
         See :func:`search_tasks`.
 
     Returns
@@ -360,7 +366,7 @@ def search(
         scheduler=scheduler,
         progress=progress,
         known=known,
-        hear=hear,
+        on_event=on_event,
     )
     ordered = [results[seed] for seed in seeds]
     require_fit(ordered)

@@ -23,6 +23,7 @@ class SeedCache:
     Parameters
     ----------
     store : StageStore
+        The stages of the kit; results are files of it.
     """
 
     def __init__(self, store: StageStore) -> None:
@@ -43,11 +44,12 @@ class SeedCache:
         return found
 
     def keep(self, event: Event, key: str, seconds: float = 0.0) -> Event:
-        """Keep what `event` tells.
+        """Keep what an event brings.
 
         Parameters
         ----------
         event : Event
+            What a seed found, or that it ended.
         key : str
             Digest of all that the seed's result depends on.
         seconds : float

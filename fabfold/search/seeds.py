@@ -1,4 +1,4 @@
-"""One seed of the tree search as a task: what it is given, what it tells, and who may run it."""
+"""One seed of the tree search as a task: what it is given, what it reports, and who may run it."""
 
 from __future__ import annotations
 
@@ -94,8 +94,8 @@ class Executor(Protocol):
     def submit(self, job: Job, seed: int) -> None:
         """Start a seed; only where one is free."""
 
-    def wait(self, hear: Callable[[Event], None], seconds: float) -> None:
-        """Tell `hear` what happened, after waiting for it `seconds` at most.
+    def wait(self, on_event: Callable[[Event], None], seconds: float) -> None:
+        """Tell `on_event` what happened, after waiting for it `seconds` at most.
 
         Raises
         ------
@@ -118,18 +118,20 @@ def run_seed(
     Parameters
     ----------
     job : Job
+        What is searched, by which judge, for how long.
     seed : int
+        Seed of every random choice.
     report : callable
         Called with each better tree as it is found.
     stop : callable
         Polled; once it returns True the seed ends with what it has.
     """
-    heard = False
+    stopping = False
 
     def stopped() -> bool:
-        nonlocal heard
-        heard = heard or stop()
-        return heard
+        nonlocal stopping
+        stopping = stopping or stop()
+        return stopping
 
     candidates: tuple[Candidate, ...] = ()
     fits, why, failed = True, "", False
@@ -140,8 +142,8 @@ def run_seed(
     except NoFoldError as error:
         why = str(error)
     except NoTreeError as error:
-        fits, why = heard, str(error)  # With more time one might have fitted.
+        fits, why = stopping, str(error)  # With more time one might have fitted.
     except Exception:
         # One seed that trips over a mistake must not take the others' results with it.
         why, failed = f"seed {seed} failed:\n{traceback.format_exc()}", True
-    return SeedResult(candidates, fits, why, cut=0.0 if heard else None, failed=failed)
+    return SeedResult(candidates, fits, why, cut=0.0 if stopping else None, failed=failed)

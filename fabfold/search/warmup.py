@@ -13,10 +13,10 @@ from fabfold.tree.catalogue import JointSet
 from fabfold.tree.effort import EFFORTS
 from fabfold.tree.problem import tree_problem
 
-__all__ = ["strip_job"]
+__all__ = ["warm_up_job"]
 
 
-def strip_job(joints: JointSet = "S") -> Job:
+def warm_up_job(joints: JointSet = "S") -> Job:
     """A strip of 8 voxels that folds into 2 x 2 x 2, every joint printable.
 
     Its search calls all kernels that the search of a model with these joints calls: those of
