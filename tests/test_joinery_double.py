@@ -28,7 +28,7 @@ from fabfold.solid.model import Solid
 from fabfold.tree.catalogue import double_joints
 from fabfold.tree.check import check_tree
 from fabfold.writing import write_kit
-from hinges.errors import FitError
+from hinges.exceptions import FitError
 
 VOXEL, CLEARANCE = 20.0, 0.3
 PAIR = [[0, 0, 0], [1, 0, 0]]
