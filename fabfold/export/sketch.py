@@ -10,7 +10,7 @@ from fabfold.export.picture import strip
 from fabfold.export.render import Image, View
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import BodyMesh, Joinery
-from fabfold.joinery.cells import eroded_room, model_manifold
+from fabfold.joinery.cells import eroded_cells, model_manifold
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.voxels.voxel_model import Voxels
 
@@ -29,7 +29,7 @@ def _pieces(voxels: Voxels, tree: FoldTree) -> tuple[tuple[BodyMesh, ...], NDArr
         else:
             own = list(body.voxels)
             octants = None if tree.octants is None else tree.octants[own]
-            cut = model ^ eroded_room(tree.source[own], octants, _VOXEL, _GAP / 2)
+            cut = model ^ eroded_cells(tree.source[own], _VOXEL, _GAP / 2, octants)
             mesh = cut.to_mesh64()
             vertices = np.asarray(mesh.vert_properties, dtype=float)[:, :3]
             faces = np.asarray(mesh.tri_verts, dtype=np.int32)
