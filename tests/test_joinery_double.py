@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import manifold3d
 import numpy as np
+import pygltflib
 import pytest
 from double_models import RIGID, full_solid, hand_tree, motion_of, planned
 from joinery_models import posed, voxels_of
@@ -295,7 +296,6 @@ def test_a_kit_with_a_link_passes_its_checks(kit):
 
 def test_a_kit_names_its_link_everywhere(kit):
     import lib3mf
-    import pygltflib
     from build123d import import_step
 
     folder, tree, joinery, _ = kit

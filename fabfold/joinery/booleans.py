@@ -41,7 +41,20 @@ def union(solids: list[manifold3d.Manifold]) -> manifold3d.Manifold:
 
 
 def subtract(solid: manifold3d.Manifold, tools: list[manifold3d.Manifold]) -> manifold3d.Manifold:
-    """A solid without what lies in any of some tools."""
+    """A solid without what lies in any of some tools.
+
+    Parameters
+    ----------
+    solid : manifold3d.Manifold
+        The solid, mm.
+    tools : list of manifold3d.Manifold
+        What is taken from it, mm.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In mm.
+    """
     if not tools:
         return evaluated(solid)
     return evaluated(evaluated(solid) - union(tools))

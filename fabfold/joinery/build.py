@@ -234,6 +234,7 @@ def _voxel_body(
 
     @cache
     def strut_space() -> manifold3d.Manifold:
+        """Where struts of the body may run."""
         keep_outs = [*carving_tools, *carved.strut_keep_outs.get(cutter.index, [])]
         passing = effective_tools([*grooves, *pockets], space)
         return subtract(space, [*cutouts, *keep_outs, *passing])
