@@ -151,8 +151,6 @@ def write_3mf(
         materials.AddMaterial(name, wrapper.RGBAToColor(*(int(c) for c in colour), 255))
         for name, colour in zip(names, colours, strict=True)
     ]
-    lowest = np.min([vertices.min(axis=0) for vertices, _ in meshes], axis=0)
-    place = _translation(lib3mf, -np.round(lowest.astype(float), _DECIMALS))
     model.SetBuildUUID(str(uuid.uuid5(space, "build")))
     bodies = []
     for name, mesh, paint in zip(names, meshes, paints, strict=True):
@@ -160,27 +158,35 @@ def write_3mf(
         body.SetObjectLevelProperty(materials.GetResourceID(), paint)
         body.SetUUID(str(uuid.uuid5(space, name)))
         bodies.append(body)
-    tops, settings = bodies, {}
+    built, settings = bodies, {}
     if layout == "kit":
         for body in bodies:
             # PrusaSlicer fails on objects of type "model" that are not built.
             body.SetType(lib3mf.ObjectType.Other)
         whole = _add_whole(lib3mf, model, title, meshes, materials.GetResourceID(), paints)
         settings = {"Slic3r_PE_model.config": _prusa_config(whole, title, names, meshes)}
-        tops = [whole]
+        built = [whole]
     elif layout == "assembly":
-        whole = model.AddComponentsObject()
-        whole.SetName(title)
-        for name, body in zip(names, bodies, strict=True):
-            component = whole.AddComponent(body, wrapper.GetIdentityTransform())
-            component.SetUUID(str(uuid.uuid5(space, f"component {name}")))
+        whole = _add_assembly(wrapper, model, title, names, bodies, space)
         settings = {"model_settings.config": _bambu_config(whole, title, names, bodies)}
-        tops = [whole]
+        built = [whole]
     if layout != "apart":
-        tops[0].SetUUID(str(uuid.uuid5(space, "kit")))
-    for index, top in enumerate(tops):
-        item = model.AddBuildItem(top, place)
+        built[0].SetUUID(str(uuid.uuid5(space, "kit")))
+    lowest = np.min([vertices.min(axis=0) for vertices, _ in meshes], axis=0)
+    place = _translation(lib3mf, -np.round(lowest.astype(float), _DECIMALS))
+    for index, entry in enumerate(built):
+        item = model.AddBuildItem(entry, place)
         item.SetUUID(str(uuid.uuid5(space, f"item {index}")))
+    _attach(model, settings, thumbnail)
+    writer = model.QueryWriter("3mf")
+    writer.SetDecimalPrecision(_DECIMALS)
+    with replacing(path) as temporary:
+        writer.WriteToFile(str(temporary))
+        temporary.write_bytes(_repacked(temporary.read_bytes()))
+
+
+def _attach(model: Any, settings: Mapping[str, str], thumbnail: bytes | None) -> None:
+    """Put files of slicer settings, by name, and a thumbnail into the package."""
     if settings:
         model.AddCustomContentType("config", "text/xml")
     for file_name, text in settings.items():
@@ -188,11 +194,6 @@ def write_3mf(
         attachment.ReadFromBuffer(text.encode("utf-8"))
     if thumbnail is not None:
         model.CreatePackageThumbnailAttachment().ReadFromBuffer(thumbnail)
-    writer = model.QueryWriter("3mf")
-    writer.SetDecimalPrecision(_DECIMALS)
-    with replacing(path) as temporary:
-        writer.WriteToFile(str(temporary))
-        temporary.write_bytes(_repacked(temporary.read_bytes()))
 
 
 def _repacked(package: bytes) -> bytes:
@@ -253,6 +254,18 @@ def _add_whole(
     record[:, 1:] = painted[:, None]
     properties = (lib3mf.TriangleProperties * len(record)).from_buffer_copy(record.tobytes())
     whole.SetAllTriangleProperties(properties)
+    return whole
+
+
+def _add_assembly(
+    wrapper: Any, model: Any, title: str, names: list[str], bodies: list[Any], space: uuid.UUID
+) -> Any:
+    """Add one object that holds all bodies as components, in their places."""
+    whole = model.AddComponentsObject()
+    whole.SetName(title)
+    for name, body in zip(names, bodies, strict=True):
+        component = whole.AddComponent(body, wrapper.GetIdentityTransform())
+        component.SetUUID(str(uuid.uuid5(space, f"component {name}")))
     return whole
 
 
