@@ -7,10 +7,12 @@ import itertools
 import json
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
 from types import SimpleNamespace
 
+import lib3mf
 import manifold3d as m3
 import numpy as np
 import pygltflib
@@ -98,8 +100,6 @@ def test_stl_bodies_are_closed_and_keep_their_volume(tmp_path, kit):
 
 
 def _read_3mf(path: Path):
-    import lib3mf
-
     model = lib3mf.get_wrapper().CreateModel()
     reader = model.QueryReader("3mf")
     reader.SetStrictModeActive(True)
@@ -147,8 +147,6 @@ def test_3mf_kit_names_the_parts_for_prusaslicer(tmp_path, kit):
     write_3mf(path, kit.joinery, title='Row <of "4">', thumbnail=b"png")
     _, (*_, whole) = _read_3mf(path)
     assert whole.IsManifoldAndOriented()
-    import xml.etree.ElementTree as ET
-
     config = ET.fromstring(zipfile.ZipFile(path).read("Metadata/Slic3r_PE_model.config"))
     assert zipfile.ZipFile(path).read("Metadata/thumbnail.png") == b"png"
     (entry,) = config.findall("object")

@@ -307,7 +307,7 @@ def test_too_small_a_voxel_names_the_smallest_that_works():
     with pytest.raises(RecipeError, match=f"smallest voxel .* {smallest_voxel(0.4):g} mm"):
         hinge_size(8.0, 0.4)
     least = smallest_voxel(0.4)
-    assert hinge_size(least, 0.4).barrel_radius_mm > 0
+    assert hinge_size(least, 0.4).barrel_radius_mm >= least / 8
     with pytest.raises(RecipeError, match="leave barrel, pin and knuckles"):
         hinge_size(20.0, 0.3, barrel_radius_mm=1.0)
 

@@ -3,10 +3,12 @@
 import json
 from dataclasses import replace
 
+import lib3mf
 import manifold3d
 import numpy as np
 import pygltflib
 import pytest
+from build123d import import_step
 from double_models import RIGID, full_solid, hand_tree, motion_of, planned
 from joinery_models import posed, voxels_of
 
@@ -293,9 +295,6 @@ def test_a_kit_with_a_link_passes_its_checks(kit):
 
 
 def test_a_kit_names_its_link_everywhere(kit):
-    import lib3mf
-    from build123d import import_step
-
     folder, tree, joinery, _ = kit
     names = [body.name for body in tree.bodies]
     assert "link-00" in names
