@@ -11,7 +11,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from fabfold.export.picture import png_bytes
+from fabfold.export.render import png_bytes
 from fabfold.export.sketch import picture_of_tree
 from fabfold.files import write_bytes
 from fabfold.kit.kit import Kit

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.export.camera import View
 from fabfold.export.colours import palette
-from fabfold.export.picture import picture_of_kit
-from fabfold.export.render import Image, Mesh, View, png_bytes, render
+from fabfold.export.kit_picture import picture_of_kit
+from fabfold.export.render import Image, Mesh, png_bytes, render
 from fabfold.files import write_bytes
 from fabfold.lattice.creases import folded_template, parts_of
 from fabfold.lattice.shipped import load_template

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.fold.motion import Motion
+from fabfold.joinery.cells import as_manifold, occupancy
 from fabfold.lattice.template import Template
 from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
 from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
@@ -17,8 +19,6 @@ def box_mesh(
     low: NDArray[np.float64] | list[float], high: NDArray[np.float64] | list[float]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Twelve triangles of an axis-aligned box."""
-    import manifold3d
-
     size = np.subtract(high, low)
     cube = manifold3d.Manifold.cube(tuple(size)).translate(tuple(np.asarray(low, dtype=float)))
     mesh = cube.to_mesh64()
@@ -27,8 +27,6 @@ def box_mesh(
 
 def voxels_of(cells: NDArray[np.int32], solid) -> Voxels:
     """Voxels of a manifold in lattice units."""
-    from fabfold.joinery.cells import occupancy
-
     mesh = solid.to_mesh64()
     step = 1.0 / SUBDIVISION
     subvoxels = np.array(
@@ -123,8 +121,6 @@ def motion_of_order(tree: FoldTree, order: list[int]) -> Motion:
 
 def box_strip(length: int):
     """Solid bar around a strip of cells, a little smaller than the cells."""
-    import manifold3d
-
     size = (length - 0.02, 0.98, 0.98)
     return manifold3d.Manifold.cube(size, True).translate(((length - 1) / 2, 0, 0))
 
@@ -164,8 +160,6 @@ def corner_tree() -> FoldTree:
 
 def corner_solid():
     """Full cubes for the cells of :func:`corner_tree`."""
-    import manifold3d
-
     cubes = [
         manifold3d.Manifold.cube((0.99, 0.99, 0.99), True).translate(tuple(map(float, cell)))
         for cell in corner_tree().source
@@ -179,8 +173,6 @@ def corner_solid():
 
 def posed(joinery, tree: FoldTree, angles_deg: NDArray[np.float64]):
     """Bodies of a kit as manifolds in a state of the folding path, mm, root body at rest."""
-    from fabfold.joinery.cells import as_manifold
-
     origin = np.array(joinery.origin_mm)
     placed = []
     for body, pose in zip(joinery.bodies, tree.body_poses(angles_deg), strict=True):

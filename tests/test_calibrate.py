@@ -1,10 +1,12 @@
 import pytest
+import trimesh
 from typer.testing import CliRunner
 
 from fabfold.cli.app import app
 from fabfold.errors import RecipeError
 from fabfold.printing.calibrate import calibrate, write_profile
 from fabfold.printing.profiles import load_profile
+from hinges.coupon import DEFAULT_CLEARANCES
 
 
 def test_a_calibrated_profile_survives_its_file(tmp_path):
@@ -40,7 +42,9 @@ def test_the_commands_write_coupon_and_profile(tmp_path, monkeypatch):
     assert load_profile("my-fdm-pla-0.4.toml").clearance_mm == 0.3
     done = run(app, ["coupon", "--profile", "fdm-pla-0.4", "-o", "coupon.stl"])
     assert done.exit_code == 0, done.output
-    assert (tmp_path / "coupon.stl").stat().st_size > 84
+    coupon = trimesh.load_mesh(tmp_path / "coupon.stl")
+    # A frame, and for each clearance the flap of a single hinge, and link and flap of a double one.
+    assert coupon.body_count == 1 + 3 * len(DEFAULT_CLEARANCES)
     done = run(app, ["coupon", "-o", "coupon.xyz"])
     assert done.exit_code == 2
     done = run(app, ["coupon", "--clearances", "0.2,x", "-o", "coupon.stl"])

@@ -7,14 +7,17 @@ import itertools
 import json
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 import zipfile
-from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
+import lib3mf
 import manifold3d as m3
 import numpy as np
+import pygltflib
 import pytest
+import trimesh
 from export_kits import ROW, VOXEL_MM, row_joinery, row_motion, row_tree
 
 from fabfold.errors import GeometryError
@@ -22,10 +25,11 @@ from fabfold.export.colours import _oklab, body_colours, hex_colour, palette
 from fabfold.export.glb import keyframe_times, write_glb
 from fabfold.export.report import write_report
 from fabfold.export.shading import corner_normals, split_vertices
-from fabfold.export.stl import write_combined_stl, write_stl
+from fabfold.export.stl import write_stl
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.export.weld import is_closed, printable_mesh, weld
 from fabfold.joinery.bodies import BodyMesh
+from fabfold.printing.checks import Check
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +85,6 @@ def test_printable_mesh_says_which_body_cannot_be_closed():
 
 
 def test_stl_bodies_are_closed_and_keep_their_volume(tmp_path, kit):
-    trimesh = pytest.importorskip("trimesh")
     paths = write_stl(tmp_path / "bodies", kit.joinery)
     assert [p.name for p in paths] == [f"body-{i:02d}.stl" for i in range(4)]
     for path, body in zip(paths, kit.joinery.bodies, strict=True):
@@ -93,20 +96,10 @@ def test_stl_bodies_are_closed_and_keep_their_volume(tmp_path, kit):
         )
 
 
-def test_combined_stl_holds_every_body(tmp_path, kit):
-    trimesh = pytest.importorskip("trimesh")
-    write_combined_stl(tmp_path / "kit.stl", kit.joinery)
-    mesh = trimesh.load_mesh(tmp_path / "kit.stl")
-    assert mesh.body_count == 4
-    assert mesh.volume == pytest.approx(sum(b.volume for b in kit.joinery.bodies), rel=1e-4)
-
-
 # 3MF ------------------------------------------------------------------------------------------
 
 
 def _read_3mf(path: Path):
-    import lib3mf
-
     model = lib3mf.get_wrapper().CreateModel()
     reader = model.QueryReader("3mf")
     reader.SetStrictModeActive(True)
@@ -154,8 +147,6 @@ def test_3mf_kit_names_the_parts_for_prusaslicer(tmp_path, kit):
     write_3mf(path, kit.joinery, title='Row <of "4">', thumbnail=b"png")
     _, (*_, whole) = _read_3mf(path)
     assert whole.IsManifoldAndOriented()
-    import xml.etree.ElementTree as ET
-
     config = ET.fromstring(zipfile.ZipFile(path).read("Metadata/Slic3r_PE_model.config"))
     assert zipfile.ZipFile(path).read("Metadata/thumbnail.png") == b"png"
     (entry,) = config.findall("object")
@@ -262,7 +253,6 @@ def _world(gltf, at: float) -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def glb(tmp_path_factory, kit):
-    pygltflib = pytest.importorskip("pygltflib")
     path = tmp_path_factory.mktemp("glb") / "fold.glb"
     write_glb(path, kit.joinery, kit.tree, kit.motion, title="Row")
     return pygltflib.GLTF2().load(str(path))
@@ -363,21 +353,11 @@ def test_body_colours_part_neighbours(kit):
     assert len(np.unique(colours, axis=0)) == len(kit.tree.bodies)
 
 
-@dataclass(frozen=True)
-class _Check:
-    name: str
-    figure: float | int | str | None
-    limit: float | int | str | None
-    unit: str
-    ok: bool
-    note: str
-
-
 def test_report_json_and_page(tmp_path):
     checks = [
-        _Check("least gap", np.float64(0.3), 0.2, "mm", True, "bodies stay apart"),
-        _Check("bodies", 4, 4, "", True, ""),
-        _Check("wall <thin>", float("nan"), 0.8, "mm", False, "use a larger voxel"),
+        Check("least gap", np.float64(0.3), 0.2, "mm", True, "bodies stay apart"),
+        Check("bodies", 4.0, 4.0, "", True, ""),
+        Check("wall <thin>", float("nan"), 0.8, "mm", False, "use a larger voxel"),
     ]
     write_report(
         tmp_path,
@@ -410,13 +390,12 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[2])
 from export_kits import row_joinery, row_motion, row_tree
 from fabfold.export.glb import write_glb
-from fabfold.export.stl import write_combined_stl, write_stl
+from fabfold.export.stl import write_stl
 from fabfold.export.threemf import write_3mf
 folder = Path(sys.argv[1])
 tree = row_tree()
 joinery = row_joinery(tree)
 write_stl(folder / "bodies", joinery)
-write_combined_stl(folder / "kit.stl", joinery)
 for layout in ("kit", "assembly", "apart"):
     write_3mf(folder / f"{layout}.3mf", joinery, title="Row", metadata={"seed": "1"}, layout=layout)
 write_glb(folder / "fold.glb", joinery, tree, row_motion(tree))
@@ -438,5 +417,5 @@ def test_two_processes_write_the_same_bytes(tmp_path):
                 if p.is_file()
             }
         )
-    assert len(digests[0]) == 9
+    assert len(digests[0]) == 8
     assert digests[0] == digests[1]

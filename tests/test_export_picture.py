@@ -12,21 +12,14 @@ import manifold3d as m3
 import numpy as np
 import pytest
 from export_kits import row_joinery, row_motion, row_tree
+from PIL import Image
 
 from fabfold.errors import RecipeError
+from fabfold.export.camera import View
 from fabfold.export.colours import body_colours
-from fabfold.export.picture import (
-    View,
-    halfway,
-    picture_of_kit,
-    picture_of_solid,
-    png_bytes,
-    render,
-    strip,
-    write_strip,
-)
+from fabfold.export.kit_picture import halfway, picture_of_kit, strip, write_strip
+from fabfold.export.render import png_bytes, render
 from fabfold.fold.motion import Motion
-from fabfold.solid.closed_solid import Solid
 
 SMALL = View(size=(120, 90), samples=1, lights=6)
 
@@ -151,9 +144,8 @@ def test_halfway_is_between_keyframes():
 
 
 def test_png_reads_back():
-    image_module = pytest.importorskip("PIL.Image")
     image = np.random.default_rng(0).integers(0, 256, (13, 17, 3), dtype=np.uint8)
-    assert np.array_equal(np.asarray(image_module.open(io.BytesIO(png_bytes(image)))), image)
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(png_bytes(image)))), image)
 
 
 def test_bad_views_are_refused():
@@ -169,14 +161,14 @@ _DRAW = """
 import sys
 sys.path.insert(0, sys.argv[1])
 import hashlib
-from test_export_picture import SMALL, png_bytes, picture_of_solid, solid
-print(hashlib.sha256(png_bytes(picture_of_solid(solid(), SMALL))).hexdigest())
+from test_export_picture import ball_and_block, png_bytes
+print(hashlib.sha256(png_bytes(ball_and_block())).hexdigest())
 """
 
 
-def solid() -> Solid:
-    vertices, faces = _mesh(m3.Manifold.sphere(3, 32) + m3.Manifold.cube((4, 2, 2)))
-    return Solid("ball", vertices, faces)
+def ball_and_block() -> np.ndarray:
+    solid = m3.Manifold.sphere(3, 32) + m3.Manifold.cube((4, 2, 2))
+    return render([_mesh(solid)], np.array([[143, 169, 196]], np.uint8), view=SMALL)
 
 
 def test_another_process_draws_the_same_bytes():
@@ -186,4 +178,4 @@ def test_another_process_draws_the_same_bytes():
         capture_output=True,
         encoding="utf-8",
     ).stdout.strip()
-    assert found == hashlib.sha256(png_bytes(picture_of_solid(solid(), SMALL))).hexdigest()
+    assert found == hashlib.sha256(png_bytes(ball_and_block())).hexdigest()

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import manifold3d as m3
 import numpy as np
 import pytest
+from build123d import import_step
 from export_kits import BARREL_MM, CLEARANCE_MM, row_joinery, row_tree
 
 from fabfold.errors import GeometryError
@@ -35,8 +36,7 @@ def _joinery(*solids: m3.Manifold) -> Joinery:
 
 
 def _read(path: Path):
-    build123d = pytest.importorskip("build123d")
-    return build123d.import_step(path)
+    return import_step(path)
 
 
 def _valid(solid) -> bool:

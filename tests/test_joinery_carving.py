@@ -14,8 +14,8 @@ from fabfold.fold.carving_plan import plan_carving
 from fabfold.fold.motion import quarter_path
 from fabfold.joinery import build
 from fabfold.joinery.build import build_bodies
-from fabfold.joinery.carving import Carved
-from fabfold.joinery.hinge_placement import knuckle_zone
+from fabfold.joinery.carving import CarvedMaterial
+from fabfold.joinery.hinge_placement import barrel_solid
 from fabfold.joinery.sizes import hinge_size
 from fabfold.proof.certify import certify
 from fabfold.proof.replay import replay
@@ -62,7 +62,6 @@ def test_carved_bodies_keep_the_gap_at_every_angle(case, request):
 
 
 def test_samples_by_another_library_see_the_gap_too(lid):
-    pytest.importorskip("fcl")
     tree, motion, _, joinery = lid
     seen = sample_path(
         tree.to_json(joinery.voxel_mm, joinery.origin_mm),
@@ -77,7 +76,7 @@ def test_samples_by_another_library_see_the_gap_too(lid):
 
 def test_without_carving_they_jam(slot, monkeypatch):
     tree, motion, voxels, _ = slot
-    monkeypatch.setattr(build, "carve", lambda *_, **__: Carved())
+    monkeypatch.setattr(build, "carve", lambda *_, **__: CarvedMaterial())
     joinery = build_bodies(voxels, tree, motion, voxel_mm=VOXEL, clearance_mm=CLEARANCE)
     with pytest.raises(CheckError, match="run into each other"):
         proof(tree, motion, joinery)
@@ -102,9 +101,9 @@ def test_no_hinge_is_cut(lid):
     start = np.zeros(len(tree.hinges))
     offset = tuple(joinery.origin_mm)
     for hinge in tree.hinges:
-        zone = knuckle_zone(hinge, size, VOXEL).translate(offset)
+        barrel = barrel_solid(hinge, size, VOXEL).translate(offset)
         for cut, uncut in zip(posed(joinery, tree, start), posed(whole, tree, start), strict=True):
-            assert (cut ^ zone).volume() == pytest.approx((uncut ^ zone).volume(), abs=0.01)
+            assert (cut ^ barrel).volume() == pytest.approx((uncut ^ barrel).volume(), abs=0.01)
 
 
 def test_a_cut_through_a_hinge_is_refused(slot, monkeypatch):

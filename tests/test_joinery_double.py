@@ -3,21 +3,24 @@
 import json
 from dataclasses import replace
 
+import lib3mf
 import manifold3d
 import numpy as np
+import pygltflib
 import pytest
+from build123d import import_step
 from double_models import RIGID, full_solid, hand_tree, motion_of, planned
 from joinery_models import posed, voxels_of
 
 from fabfold.errors import GeometryError
+from fabfold.joinery.barrel_sweeps import Sweep
 from fabfold.joinery.build import build_bodies
-from fabfold.joinery.cutting import Cut
-from fabfold.joinery.grooves import Passage
-from fabfold.joinery.hinge_placement import double_layout, fittings, hinge_frames
+from fabfold.joinery.cutting import BodyCutter
+from fabfold.joinery.hinge_placement import double_layout, hinge_frames, place_hinges
 from fabfold.joinery.links import link_body
-from fabfold.joinery.one_piece import MendTally
 from fabfold.joinery.pockets import grown_corners
 from fabfold.joinery.sizes import hinge_size, smallest_voxel
+from fabfold.joinery.tally import BuildTally
 from fabfold.kit.checking import run_checks
 from fabfold.kit.stages import Attempt, Made
 from fabfold.kit.writing import write_kit
@@ -75,15 +78,14 @@ def test_every_double_hinge_of_the_catalogue_fits(clearance):
         tree = hand_tree(PAIR, [(0, 1, ("D", joint.sides, joint.turns))])
         # Where the cubes go on the way does not matter here.
         path = [(h, 1) for h in (1, 0) for _ in range(joint.turns[h])]
-        fitted = fittings(tree, motion_of(tree, path), size, VOXEL)
-        plate = fitted.plates[1]
-        assert [len(halves) for halves in fitted.halves] == [1, 0, 1]
-        assert len(plate.link.decompose()) == 1
-        np.testing.assert_allclose(
-            [plate.corners[:, 0].min(), plate.corners[:, 0].max()],
-            VOXEL / 2 + np.array([-0.5, 0.5]) * plate.thickness_mm,
-        )
-        low, high = np.reshape(plate.link.bounding_box(), (2, 3))
+        hinges = place_hinges(tree, motion_of(tree, path), size, VOXEL)
+        plate = hinges.plates[1]
+        assert [len(halves) for halves in hinges.halves] == [1, 0, 1]
+        assert len(plate.solid.decompose()) == 1
+        lowest, highest = plate.corners[:, 0].min(), plate.corners[:, 0].max()
+        assert (lowest + highest) / 2 == pytest.approx(VOXEL / 2)
+        assert 1.5 <= highest - lowest <= 2.0 + 1e-9
+        low, high = np.reshape(plate.solid.bounding_box(), (2, 3))
         for hinge in tree.hinges:
             reach = np.abs(np.array(hinge.point) - (0.5, 0.0, 0.0)) > 0.25
             outer = np.where(np.array(hinge.point) > 0, high, low)[reach]
@@ -223,14 +225,16 @@ def test_two_plates_in_one_face_are_refused():
     # The first link in a pose where the plate of another one would be: a copy of it, as a tool.
     motion = motion_of(tree, planned(tree))
     size = hinge_size(VOXEL, CLEARANCE)
-    fitted = fittings(tree, motion, size, VOXEL)
-    plate = fitted.plates[1]
+    hinges = place_hinges(tree, motion, size, VOXEL)
+    plate = hinges.plates[1]
     corners = grown_corners(plate, CLEARANCE) / VOXEL
-    other = replace(plate, body=2, bodies=(0, 0))
-    way = Passage(1, 2, corners, np.zeros(3), np.zeros(3), 0.0)
-    cut = Cut(1, tree, replace(fitted, plates={1: plate, 2: other}), [], [way], size, VOXEL)
+    other = replace(plate, bodies=(0, 0))
+    sweep = Sweep(1, 2, corners, np.zeros(3), np.zeros(3), 0.0)
+    cutter = BodyCutter(
+        1, tree, replace(hinges, plates={1: plate, 2: other}), [], [sweep], size, VOXEL
+    )
     with pytest.raises(GeometryError, match=r"link-00: .* cut it apart"):
-        link_body(cut, MendTally())
+        link_body(cutter, BuildTally())
 
 
 @pytest.mark.parametrize(("across", "fate"), [(True, "cut"), (False, "kept")])
@@ -241,20 +245,20 @@ def test_a_barrel_may_groove_a_link_but_not_cut_it(across, fate):
     )
     motion = motion_of(tree, planned(tree))
     size = hinge_size(VOXEL, CLEARANCE)
-    fitted = fittings(tree, motion, size, VOXEL)
-    plate = fitted.plates[1]
+    hinges = place_hinges(tree, motion, size, VOXEL)
+    plate = hinges.plates[1]
     ends = [[0.5, 0.0, -0.5], [0.5, 0.0, 0.5]] if across else [[0.5, -0.5, 0.4], [0.5, 0.5, 0.4]]
-    way = Passage(1, 2, np.array(ends), np.zeros(3), np.zeros(3), 0.0)
-    cut = Cut(1, tree, fitted, [way], [], size, VOXEL)
-    tally = MendTally()
+    sweep = Sweep(1, 2, np.array(ends), np.zeros(3), np.zeros(3), 0.0)
+    cutter = BodyCutter(1, tree, hinges, [sweep], [], size, VOXEL)
+    tally = BuildTally()
     if fate == "cut":
         with pytest.raises(GeometryError, match="link-00: hinge-02 cut it apart"):
-            link_body(cut, tally)
+            link_body(cutter, tally)
     else:
-        solid = link_body(cut, tally)
+        solid = link_body(cutter, tally)
         assert len(solid.decompose()) == 1
         assert tally.links_cut == 1
-        assert tally.links_mm3 == pytest.approx(plate.link.volume() - solid.volume())
+        assert tally.links_mm3 == pytest.approx(plate.solid.volume() - solid.volume())
         assert tally.links_mm3 > 1.0
 
 
@@ -291,10 +295,6 @@ def test_a_kit_with_a_link_passes_its_checks(kit):
 
 
 def test_a_kit_names_its_link_everywhere(kit):
-    import lib3mf
-    import pygltflib
-    from build123d import import_step
-
     folder, tree, joinery, _ = kit
     names = [body.name for body in tree.bodies]
     assert "link-00" in names

@@ -12,10 +12,11 @@ from joinery_models import corner_tree, motion_of_order, strip_tree
 from fabfold.errors import GeometryError
 from fabfold.fold.barrels import encounter_on_lattice, first_encounter, segment_distance
 from fabfold.fold.motion import Motion
+from fabfold.joinery.barrel_sweeps import Sweep, barrel_sweeps, descendants
 from fabfold.joinery.cells import as_manifold, eroded_cells, occupancy
-from fabfold.joinery.grooves import Passage, descendants, groove_tools, passages
+from fabfold.joinery.grooves import groove_tools
 from fabfold.joinery.hinge_placement import hinge_frames
-from fabfold.joinery.soundness import finish_mesh, mesh_faults, piece_count, stl_mesh
+from fabfold.joinery.soundness import mesh_faults, piece_count, printable_body, stl_mesh
 from fabfold.lattice.rotations import rotation_about
 from fabfold.tree.system import hinge_system
 
@@ -78,14 +79,14 @@ def test_open_mesh_is_refused():
 @pytest.mark.parametrize("angle", [90.0, -180.0])
 def test_groove_holds_the_swept_barrel_and_little_more(start, direction, angle):
     side, radius, trim = 20.0, 2.8, 2.5
-    passage = Passage(0, 0, np.array(start), np.zeros(3), np.array(direction), angle)
+    sweep = Sweep(0, 0, np.array(start), np.zeros(3), np.array(direction), angle)
     box = np.full((1, 3), 4.0)
-    tools = groove_tools([passage], -box, box, voxel_mm=side, radius_mm=radius, trim_mm=trim)
+    tools = groove_tools([sweep], -box, box, voxel_mm=side, radius_mm=radius, trim_mm=trim)
     groove = manifold3d.Manifold.batch_boolean([tool for _, tool in tools], manifold3d.OpType.Add)
 
     def distance(points, angles):
         """From points to the barrel's groove cylinder at each angle, shape (points, angles)."""
-        ends = side * passage.placements(angles)
+        ends = side * sweep.placements(angles)
         along = ends[:, 1] - ends[:, 0]
         length = np.linalg.norm(along, axis=1)
         along = along / length[:, None]
@@ -105,7 +106,7 @@ def test_groove_holds_the_swept_barrel_and_little_more(start, direction, angle):
     assert inside[nearest == 0.0].all()
     # A barrel along the axis is followed to hundredths of a millimetre; one across it turns on
     # itself between two steps, and the groove spares what lies between.
-    parallel = abs(float(np.dot(passage.direction, passage.start[1] - passage.start[0]))) > 0.5
+    parallel = abs(float(np.dot(sweep.axis, sweep.points[1] - sweep.points[0]))) > 0.5
     assert nearest[inside].max() < (0.06 if parallel else 0.2)
 
 
@@ -116,18 +117,18 @@ def _inside(solid, point) -> bool:
 
 def test_placements_turn_about_the_axis():
     start = np.array([[1.0, 2.0, 3.0], [1.0, 3.0, 3.0]])
-    passage = Passage(0, 0, start, np.array([0.5, 0.5, 0.5]), np.array([0.0, 0.0, 1.0]), 90.0)
-    for angle, ends in zip((30.0, 90.0), passage.placements(np.array([30.0, 90.0])), strict=True):
-        turn = rotation_about(passage.point, passage.direction, angle)
+    sweep = Sweep(0, 0, start, np.array([0.5, 0.5, 0.5]), np.array([0.0, 0.0, 1.0]), 90.0)
+    for angle, ends in zip((30.0, 90.0), sweep.placements(np.array([30.0, 90.0])), strict=True):
+        turn = rotation_about(sweep.axis_point, sweep.axis, angle)
         assert ends == pytest.approx(start @ turn[:3, :3].T + turn[:3, 3])
 
 
-def test_passages_find_every_barrel_that_comes_near():
+def test_sweeps_find_every_barrel_that_comes_near():
     """Compare with brute force: dense poses, every barrel against every cell."""
     tree = corner_tree()
     motion = motion_of_order(tree, [0, 1])
     reach = 0.14
-    found = {(p.body, p.hinge) for p in passages(tree, motion, reach)}
+    found = {(s.body, s.owner) for s in barrel_sweeps(tree, motion, reach)}
     wanted = set()
     for start, end in itertools.pairwise(motion.angles_deg):
         for share in np.linspace(0, 1, 46):
@@ -209,13 +210,13 @@ def test_body_that_touches_itself_is_nicked_apart():
         cube((5, 30, 10)).translate((20, -5, 0)),
     ]
     body = manifold3d.Manifold.batch_boolean(parts, manifold3d.OpType.Add)
-    vertices, faces = finish_mesh(body, "body-00", np.zeros(3))
+    vertices, faces = printable_body(body, "body-00", np.zeros(3))
     assert len(mesh_faults(vertices, faces)) == 0
     assert piece_count(vertices, faces) == 1
     solid = as_manifold(vertices, faces, "body-00")
     assert solid.volume() == pytest.approx(body.volume(), rel=1e-3)
     with pytest.raises(GeometryError, match="nothing is left"):
-        finish_mesh(manifold3d.Manifold(), "body-00", np.zeros(3))
+        printable_body(manifold3d.Manifold(), "body-00", np.zeros(3))
 
 
 def test_segment_distance():

@@ -13,7 +13,8 @@ from fabfold.errors import RecipeError
 from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.joinery.build import build_bodies
 from fabfold.joinery.sizes import hinge_size
-from fabfold.printing.checks import check_bodies, smallest_gap
+from fabfold.printing.body_checks import check_bodies
+from fabfold.printing.gap_checks import smallest_gap
 from fabfold.printing.profiles import DEFAULT_PROFILE, Profile, load_profile, profile_names
 from fabfold.printing.thickness import ray_thickness, surface_samples
 

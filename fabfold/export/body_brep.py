@@ -22,9 +22,20 @@ _STRAIGHT_MM = 1e-4
 
 @dataclass(frozen=True)
 class BrepEdge:
-    """From vertex `start` to vertex `end`.
+    """An edge from one vertex to another: straight, or an arc counter-clockwise about an axis.
 
-    Straight, or counter-clockwise about `axis` at `radius` and `height` above its point.
+    Attributes
+    ----------
+    start : int
+        Index of the vertex where it begins.
+    end : int
+        Index of the vertex where it ends.
+    axis : Axis or None
+        Axis of the arc; None for a straight edge.
+    radius : float
+        Radius of the arc in mm.
+    height : float
+        Height of the arc above the axis' point in mm.
     """
 
     start: int
@@ -41,6 +52,7 @@ class Face:
     Attributes
     ----------
     surface : Plane or Round
+        The surface that carries the face.
     loops : tuple of tuples of (edge index, bool)
         Counter-clockwise seen from outside; True where the edge runs along the loop. The outer
         loop comes first.
@@ -52,7 +64,17 @@ class Face:
 
 @dataclass(frozen=True)
 class Brep:
-    """One closed shell: vertices (v, 3) in mm, edges, faces."""
+    """One closed shell.
+
+    Attributes
+    ----------
+    vertices : (v, 3) float64 array
+        Points in mm.
+    edges : tuple of BrepEdge
+        Edges between vertices; each belongs to two faces.
+    faces : tuple of Face
+        Faces bounded by these edges.
+    """
 
     vertices: NDArray[np.float64]
     edges: tuple[BrepEdge, ...]
@@ -104,15 +126,18 @@ def brep_of(
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corners of the mesh in mm.
     faces : (f, 3) int32 array
+        Triangles as indices into `vertices`, counter-clockwise seen from outside.
     labels : (f,) int32 array
-        Region of each triangle.
+        Index of the region of each triangle.
     surfaces : sequence of Plane or Round
-        One a region.
+        Surface of each region.
 
     Returns
     -------
     Brep
+        One face for each region.
     """
     twin, starts = _half_edges(faces)
     region = np.repeat(labels, 3)

@@ -21,17 +21,19 @@ def flat_poses(
     Parameters
     ----------
     joinery : Joinery
+        The printed bodies; it tells the voxel's side and the origin.
     tree : FoldTree
-        Ends in the folded shape.
+        The tree whose path ends in the folded shape.
     motion : Motion
+        The folding path.
     template : Template
-        As it lies flat.
+        The template as it lies flat.
 
     Returns
     -------
     (b, 4, 4) float64 array or None
-        Rigid transforms from shape A in mm, the thinnest side of the template up; None where the
-        template has no creases, or the path no such state.
+        Rigid transform of each body from shape A in mm, the thinnest side of the template up; None
+        where the template has no creases, or the path no such state.
     """
     if not template.creases:
         return None

@@ -31,12 +31,14 @@ from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["SECONDS_PER_QUARTER", "glb_bytes", "keyframe_times", "write_glb"]
 
-#: How long a turn of 90 degrees takes, and how long the animation rests at A and at B.
+#: How long a turn of 90 degrees takes.
 SECONDS_PER_QUARTER = 0.6
+#: How long the animation rests at A and at B.
 _REST_SECONDS = 1.0
 #: A turn is cut into pieces of at most this angle, eased in and out.
 _STEP_DEG = 15.0
 
+#: Numbers of the glTF specification: types of components, and uses of buffer views.
 _FLOAT, _UINT = 5126, 5125
 _ARRAY, _ELEMENTS = 34962, 34963
 
@@ -47,11 +49,13 @@ def keyframe_times(motion: Motion) -> NDArray[np.float64]:
     Parameters
     ----------
     motion : Motion
+        The folding path.
 
     Returns
     -------
     (k,) float64 array
-        Starts at the rest in shape A; the animation ends one rest after the last.
+        Seconds from the start of the animation. The first keyframe comes after the rest in shape
+        A, and the animation ends one rest after the last.
     """
     turns = np.abs(np.diff(motion.angles_deg, axis=0)).max(axis=1, initial=0.0)
     durations = np.maximum(turns / 90.0, 0.25) * SECONDS_PER_QUARTER
@@ -72,16 +76,18 @@ def write_glb(
     Parameters
     ----------
     path : Path
-        Ends in ``.glb``.
+        File to write, ending in ``.glb``.
     joinery : Joinery
+        The printed bodies in shape A.
     tree : FoldTree
-        Its bodies are the joinery's, in the same order.
+        The bodies and hinges; its bodies are the joinery's, in the same order.
     motion : Motion
-        Its hinges are the tree's; see :func:`keyframe_times` for the animation's clock.
+        The folding path of the tree's hinges; see :func:`keyframe_times` for the animation's
+        clock.
     title : str
         Name of the scene and of the animation.
     colours : (b, 3) uint8 array, optional
-        sRGB, one a body; by default :func:`~fabfold.export.colours.body_colours`.
+        Colour of each body, sRGB; by default :func:`~fabfold.export.colours.body_colours`.
 
     Raises
     ------
@@ -92,7 +98,7 @@ def write_glb(
 
 
 class _Buffer:
-    """Collects accessors and the bytes they read."""
+    """The binary part of the file, with the accessors and buffer views that read it."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -100,6 +106,24 @@ class _Buffer:
         self.accessors: list[dict[str, Any]] = []
 
     def add(self, array: NDArray[Any], kind: str, target: int | None, bounds: bool = False) -> int:
+        """Append an array and return the index of its accessor.
+
+        Parameters
+        ----------
+        array : (n, ...) float or integer array
+            Written in single precision, or as unsigned 32-bit integers.
+        kind : str
+            Type of an element in glTF's words, such as ``"VEC3"``.
+        target : int or None
+            Use of the buffer view in glTF's numbers; None for animations.
+        bounds : bool
+            Whether the accessor states the least and the greatest values.
+
+        Returns
+        -------
+        int
+            Index of the new accessor.
+        """
         component = _FLOAT if array.dtype.kind == "f" else _UINT
         plain = np.ascontiguousarray(array, dtype="<f4" if component == _FLOAT else "<u4")
         view: dict[str, Any] = {
@@ -126,7 +150,7 @@ class _Buffer:
 
 
 def _linear(colour: NDArray[np.generic]) -> list[float]:
-    """Colour factors of glTF are linear light, not sRGB."""
+    """Linear light of sRGB bytes (3,), as the colour factors of glTF want it."""
     unit = np.asarray(colour, dtype=float) / 255.0
     return [
         round(float(v), 6)
@@ -134,8 +158,8 @@ def _linear(colour: NDArray[np.generic]) -> list[float]:
     ]
 
 
-def _samples(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times (s,) and angles (s, h): eased turns, in steps small enough to interpolate."""
+def _eased_samples(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times (s,) in seconds and angles (s, h) in degrees: eased turns, in small steps."""
     reached = keyframe_times(motion)
     times, angles = [0.0, float(reached[0])], [motion.angles_deg[0], motion.angles_deg[0]]
     for i in range(1, len(reached)):
@@ -151,7 +175,8 @@ def _samples(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.array(times), np.array(angles)
 
 
-def _check(joinery: Joinery, tree: FoldTree, motion: Motion) -> None:
+def _refuse_strangers(joinery: Joinery, tree: FoldTree, motion: Motion) -> None:
+    """Refuse bodies or a path that are not the tree's."""
     if [b.name for b in joinery.bodies] != [b.name for b in tree.bodies]:
         raise GeometryError("fold.glb: the joinery's bodies are not the tree's; make the kit again")
     if list(motion.hinges) != [h.name for h in tree.hinges]:
@@ -166,8 +191,32 @@ def glb_bytes(
     title: str = "kit",
     colours: NDArray[np.uint8] | None = None,
 ) -> bytes:
-    """What :func:`write_glb` writes."""
-    _check(joinery, tree, motion)
+    """The content of a binary glTF file, see :func:`write_glb`.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The printed bodies in shape A.
+    tree : FoldTree
+        The bodies and hinges; its bodies are the joinery's, in the same order.
+    motion : Motion
+        The folding path of the tree's hinges.
+    title : str
+        Name of the scene and of the animation.
+    colours : (b, 3) uint8 array, optional
+        Colour of each body, sRGB; by default :func:`~fabfold.export.colours.body_colours`.
+
+    Returns
+    -------
+    bytes
+        The same for the same input.
+
+    Raises
+    ------
+    GeometryError
+        If joinery, tree and motion do not belong together.
+    """
+    _refuse_strangers(joinery, tree, motion)
     if colours is None:
         colours = body_colours(tree)
     buffer = _Buffer()
@@ -203,7 +252,7 @@ def glb_bytes(
 
 
 def _pivots_mm(joinery: Joinery, tree: FoldTree) -> NDArray[np.float64]:
-    """Origin of each body's node in shape A: its hinge, or the root's own voxels."""
+    """Origin (b, 3) of each body's node in mm, shape A: its hinge, or the root's own voxels."""
     origin = np.asarray(joinery.origin_mm, dtype=float)
     pivots = np.zeros((len(tree.bodies), 3))
     pivots[0] = origin + joinery.voxel_mm * tree.source[list(tree.bodies[0].voxels)].mean(axis=0)
@@ -215,7 +264,10 @@ def _pivots_mm(joinery: Joinery, tree: FoldTree) -> NDArray[np.float64]:
 def _scene(
     joinery: Joinery, tree: FoldTree, colours: NDArray[np.uint8], buffer: _Buffer, title: str
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]:
-    """Node 0 is the kit; body ``i`` is node ``i + 1``, mesh ``i`` and material ``i``."""
+    """Nodes, meshes and materials of the scene.
+
+    Node 0 is the kit; body ``i`` is node ``i + 1``, mesh ``i`` and material ``i``.
+    """
     pivots = _pivots_mm(joinery, tree)
     everything = np.concatenate([body.vertices for body in joinery.bodies])
     low, high = everything.min(axis=0), everything.max(axis=0)
@@ -274,11 +326,13 @@ def _scene(
 
 
 def _floats(values: Sequence[float] | NDArray[np.float64]) -> list[float]:
+    """Numbers for JSON, rounded to nine digits; minus zero becomes zero."""
     return [float(np.round(value, 9)) + 0.0 for value in values]
 
 
 def _animation(tree: FoldTree, motion: Motion, buffer: _Buffer, title: str) -> dict[str, Any]:
-    times, angles = _samples(motion)
+    """The animation: one channel of rotations for each hinge that turns."""
+    times, angles = _eased_samples(motion)
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
     clock: dict[bytes, int] = {}

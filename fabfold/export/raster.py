@@ -30,14 +30,18 @@ def fill_triangles(
     screen : (v, 3) float64 array
         Pixel x and y of each vertex, and the inverse of its depth.
     corners : (f, 3) int32 array
-    width, height : int
+        Triangles as indices into `screen`.
+    width : int
+        Width of the picture in pixels.
+    height : int
+        Height of the picture in pixels.
 
     Returns
     -------
     nearness : (height, width) float32 array
-        Inverse depth; 0 where nothing is.
+        Inverse of the depth at each pixel; 0 where nothing is.
     triangle : (height, width) int32 array
-        -1 where nothing is.
+        Index of the nearest triangle; -1 where nothing is.
     """
     nearness = np.zeros((height, width), dtype=np.float32)
     triangle = np.full((height, width), -1, dtype=np.int32)
@@ -77,15 +81,22 @@ def surface_points(
     Parameters
     ----------
     triangle : (h, w) int32 array
+        Index of the triangle at each pixel, from :func:`fill_triangles`; -1 where nothing is.
     screen : (v, 3) float64 array
+        Pixel x and y of each vertex, and the inverse of its depth.
     corners : (f, 3) int32 array
+        Triangles as indices into `vertices`.
     vertices : (v, 3) float64 array
+        Places of the vertices.
     normals : (f, 3, 3) float32 array
-        At each corner of each triangle.
+        Unit normal at each corner of each triangle.
 
     Returns
     -------
-    points, directions : (h, w, 3) float32 arrays
+    points : (h, w, 3) float32 array
+        Place of the surface at each pixel; zero where nothing is.
+    directions : (h, w, 3) float32 array
+        Unit normal there; zero where nothing is.
     """
     height, width = triangle.shape
     points = np.zeros((height, width, 3), dtype=np.float32)
@@ -129,12 +140,14 @@ def fill_depth(flat: Floats, corners: Ints, size: int) -> NDArray[np.float32]:
     flat : (v, 3) float64 array
         Texel x and y of each vertex, and its height towards the light.
     corners : (f, 3) int32 array
+        Triangles as indices into `flat`.
     size : int
+        Texels along the side of the map.
 
     Returns
     -------
     (size, size) float32 array
-        Very low where nothing is.
+        Height towards the light; -1e30 where nothing is.
     """
     depth = np.full((size, size), -1e30, dtype=np.float32)
     for t in range(len(corners)):
@@ -187,22 +200,25 @@ def cast_light(
     Parameters
     ----------
     light : (n,) float32 array
-        Added to in place.
-    points, directions : (n, 3) float32 arrays
-        Place and normal.
+        Linear light on each point; added to in place.
+    points : (n, 3) float32 array
+        Points of surfaces.
+    directions : (n, 3) float32 array
+        Unit normals there.
     depth : (s, s) float32 array
-        From :func:`fill_depth`.
+        Shadow map of the light, from :func:`fill_depth`.
     frame : (3, 3) float64 array
-        Rows: the map's x, its y, and the direction towards the light.
+        Rows: unit vectors along the map's x, along its y, and towards the light.
     offset : (2,) float64 array
-        Of the map's corner along its x and y.
+        Place of the map's corner along its x and y, in the unit of `points`.
     scale : float
-        Texels a unit of length.
+        Texels along a unit of length.
     bias : float
-        How far points are lifted off their surface before the comparison.
+        How far points are lifted off their surface before the comparison, in the unit of `points`.
     strength : float
+        Linear light on a surface that faces the light.
     scatter : float
-        Texels by which lookups are scattered.
+        Largest distance in texels by which lookups are scattered.
     """
     size = depth.shape[0]
     state = np.int64(12345)

@@ -10,39 +10,12 @@ import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from fabfold.files import write_json, write_text
+from fabfold.printing.checks import Check
 
-__all__ = ["CheckResult", "report_data", "report_page", "write_report"]
-
-
-class CheckResult(Protocol):
-    """What a report needs to know of a check (see :mod:`fabfold.printing`)."""
-
-    @property
-    def name(self) -> str:
-        """What was looked at."""
-
-    @property
-    def figure(self) -> float | int | str | None:
-        """What was found."""
-
-    @property
-    def limit(self) -> float | int | str | None:
-        """What it is held against."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of figure and limit; empty for plain counts."""
-
-    @property
-    def ok(self) -> bool:
-        """Whether the check passed."""
-
-    @property
-    def note(self) -> str:
-        """What it means for the maker."""
+__all__ = ["report_data", "report_page", "write_report"]
 
 
 def _plain(value: Any) -> Any:
@@ -60,20 +33,20 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
-def report_data(checks: Sequence[CheckResult], summary: Mapping[str, Any]) -> dict[str, Any]:
+def report_data(checks: Sequence[Check], summary: Mapping[str, Any]) -> dict[str, Any]:
     """The content of ``report.json`` (format ``fabfold-report``, version 1).
 
     Parameters
     ----------
-    checks : sequence of CheckResult
-        In the order in which they are to be read.
+    checks : sequence of Check
+        The checks, in the order in which they are to be read.
     summary : mapping
         Facts about the kit: plain numbers, text, lists and mappings.
 
     Returns
     -------
     dict
-        ``verdict`` is ``"ok"`` when every check passed, else ``"failed"``.
+        Content for JSON; ``verdict`` is ``"ok"`` when every check passed, else ``"failed"``.
     """
     return {
         "format": "fabfold-report",
@@ -96,7 +69,7 @@ def report_data(checks: Sequence[CheckResult], summary: Mapping[str, Any]) -> di
 
 def write_report(
     folder: Path,
-    checks: Sequence[CheckResult],
+    checks: Sequence[Check],
     summary: Mapping[str, Any],
     *,
     title: str = "kit",
@@ -108,13 +81,14 @@ def write_report(
     ----------
     folder : Path
         The kit folder.
-    checks : sequence of CheckResult
+    checks : sequence of Check
+        The checks, in the order in which they are to be read.
     summary : mapping
-        See :func:`report_data`.
+        Facts about the kit, see :func:`report_data`.
     title : str
         Heading of the page.
-    pictures : sequence of (caption, PNG bytes)
-        Shown on the page, inside the file.
+    pictures : sequence of (str, bytes)
+        Caption and PNG of each picture that the page shows, inside the file.
     """
     data = report_data(checks, summary)
     write_json(folder / "report.json", data)
@@ -137,6 +111,7 @@ figcaption { color: #777; font-size: .9rem; }
 
 
 def _cell(value: Any) -> str:
+    """Text of a value for a cell of a table."""
     if value is None:
         return "–"
     if isinstance(value, bool):
@@ -158,14 +133,16 @@ def report_page(
     Parameters
     ----------
     data : mapping
-        From :func:`report_data`.
+        The report, from :func:`report_data`.
     title : str
-    pictures : sequence of (caption, PNG bytes)
+        Heading of the page.
+    pictures : sequence of (str, bytes)
+        Caption and PNG of each picture that the page shows.
 
     Returns
     -------
     str
-        HTML.
+        The page as HTML.
     """
     checks = data["checks"]
     failed = sum(check["verdict"] != "ok" for check in checks)

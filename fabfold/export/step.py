@@ -51,14 +51,15 @@ class StepFacts:
     Attributes
     ----------
     solids : int
+        Number of solids.
     faces : int
-        Of all solids.
+        Number of faces of all solids.
     round_faces : int
-        Of these on true cylinders and cones.
+        Number of those on true cylinders and cones.
     plain : tuple of str
-        Bodies that could not be written with round faces.
+        Names of the bodies that could not be written with round faces.
     volume_mm3 : float
-        Of all solids, as the CAD kernel measures it.
+        Volume of all solids in mm³, as the CAD kernel measures it.
     """
 
     solids: int
@@ -69,7 +70,20 @@ class StepFacts:
 
 
 def barrel_axes(joinery: Joinery, tree: FoldTree) -> list[list[Axis]]:
-    """Lines on which barrels lie or come to rest, for each body: the lattice edges of its cells."""
+    """Lines on which barrels lie or come to rest: the lattice edges of each body's cells.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The printed bodies; it tells the voxel's side, the origin and the size of the hinges.
+    tree : FoldTree
+        The bodies and their voxels.
+
+    Returns
+    -------
+    list of list of Axis
+        The lines of each body, in mm, by index of the body.
+    """
     origin = np.asarray(joinery.origin_mm, dtype=float)
     reach = 1.5 * (joinery.barrel_radius_mm + joinery.clearance_mm)
     found: list[list[Axis]] = []
@@ -108,19 +122,23 @@ def write_step(
     Parameters
     ----------
     path : Path
-        Ends in ``.step``.
+        File to write, ending in ``.step``.
     joinery : Joinery
+        The printed bodies in shape A.
     tree : FoldTree, optional
-        Tells where the hinges are; without it every face is flat, and none is thinned.
+        The bodies and hinges; it tells where the hinges are. Without it every face is flat, and
+        none is thinned.
     title : str, optional
         Name of the assembly; the file's stem by default.
     colours : (b, 3) uint8 array, optional
-        sRGB, one a body.
+        Colour of each body, sRGB.
     progress : Progress, optional
+        Is told which body is written.
 
     Returns
     -------
     StepFacts
+        What was written.
 
     Raises
     ------

@@ -26,7 +26,17 @@ UNCERTAINTY_MM = 1e-3
 
 
 class StepSolid(NamedTuple):
-    """A named solid and its sRGB colour (bytes)."""
+    """A solid of the file.
+
+    Attributes
+    ----------
+    name : str
+        Name of the solid.
+    brep : Brep
+        Its boundary, mm.
+    colour : (int, int, int)
+        Its colour, sRGB bytes.
+    """
 
     name: str
     brep: Brep
@@ -195,7 +205,7 @@ def step_text(solids: Sequence[StepSolid], title: str, application: str) -> str:
     Parameters
     ----------
     solids : sequence of StepSolid
-        Each becomes a part of the assembly `title`, in its place.
+        The solids; each becomes a part of the assembly `title`, in its place.
     title : str
         Name of the assembly.
     application : str
@@ -204,7 +214,7 @@ def step_text(solids: Sequence[StepSolid], title: str, application: str) -> str:
     Returns
     -------
     str
-        ASCII.
+        The content of the file, ASCII.
     """
     writer = _Writer()
     application_context = writer.add(

@@ -1,9 +1,8 @@
-"""Binary STL of every body, and of the whole kit in one file."""
+"""Binary STL of every body."""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,27 +12,31 @@ from fabfold.export.weld import printable_mesh
 from fabfold.files import write_bytes
 from fabfold.joinery.bodies import Joinery
 
-__all__ = ["stl_bytes", "write_combined_stl", "write_stl"]
+__all__ = ["stl_bytes", "write_stl"]
 
+#: Record of one triangle in the file.
 _TRIANGLE = np.dtype(
     [("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")], align=False
 )
 
 
-def stl_bytes(meshes: Sequence[tuple[NDArray[np.float32], NDArray[np.int32]]]) -> bytes:
-    """Binary STL that holds the given meshes one after the other.
+def stl_bytes(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> bytes:
+    """Binary STL of one mesh.
 
     Parameters
     ----------
-    meshes : sequence of ((v, 3) float32 array, (f, 3) int32 array)
-        Vertices in mm and triangles.
+    vertices : (v, 3) float32 array
+        Corners of the mesh in mm.
+    faces : (f, 3) int32 array
+        Triangles as indices into `vertices`.
 
     Returns
     -------
     bytes
-        The header says ``fabfold, mm`` and nothing that changes from run to run.
+        The content of the file; the header says ``fabfold, mm`` and nothing that changes from run
+        to run.
     """
-    corners = np.concatenate([vertices[faces] for vertices, faces in meshes])
+    corners = vertices[faces]
     wide = corners.astype(np.float64)
     normals = np.cross(wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -51,13 +54,14 @@ def write_stl(folder: Path, joinery: Joinery) -> list[Path]:
     Parameters
     ----------
     folder : Path
-        Made if it is not there, usually ``KIT/bodies``.
+        Folder for the files, usually ``KIT/bodies``; it is made if it is not there.
     joinery : Joinery
+        The printed bodies in shape A.
 
     Returns
     -------
     list of Path
-        In the order of the bodies.
+        The files, in the order of the bodies.
 
     Raises
     ------
@@ -67,15 +71,6 @@ def write_stl(folder: Path, joinery: Joinery) -> list[Path]:
     paths = []
     for body in joinery.bodies:
         path = folder / f"{body.name}.stl"
-        write_bytes(path, stl_bytes([printable_mesh(body)]))
+        write_bytes(path, stl_bytes(*printable_mesh(body)))
         paths.append(path)
     return paths
-
-
-def write_combined_stl(path: Path, joinery: Joinery) -> None:
-    """Write all bodies in one binary STL, in mm, shape A.
-
-    Slicers take the file as one object, so the bodies keep their places; names and colours are
-    what the 3MF file is for.
-    """
-    write_bytes(path, stl_bytes([printable_mesh(body) for body in joinery.bodies]))

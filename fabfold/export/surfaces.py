@@ -43,8 +43,10 @@ class Axis:
         Middle of the hinge, mm.
     direction : int
         0, 1 or 2: along +x, +y or +z.
-    half_length, radius : float
-        Of the cylinder that holds all that is round about the axis, mm.
+    half_length : float
+        Half the length of the cylinder that holds all that is round about the axis, mm.
+    radius : float
+        Radius of that cylinder, mm.
     """
 
     point: tuple[float, float, float]
@@ -55,7 +57,15 @@ class Axis:
 
 @dataclass(frozen=True)
 class Plane:
-    """A flat face; `normal` points out of the body."""
+    """A flat face.
+
+    Attributes
+    ----------
+    point : (3,) tuple of float
+        A point of the plane, mm.
+    normal : (3,) tuple of float
+        Unit vector out of the body.
+    """
 
     point: tuple[float, float, float]
     normal: tuple[float, float, float]
@@ -68,8 +78,10 @@ class Round:
     Attributes
     ----------
     axis : Axis
+        Axis of the cylinder or cone.
     radius : float
-        Where the surface crosses the plane through the axis' point, mm; may be negative on a cone.
+        Radius where the surface crosses the plane through the axis' point, mm; may be negative on
+        a cone.
     slope : float
         Growth of the radius along the axis.
     outward : bool
@@ -109,13 +121,16 @@ def flat_regions(
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corners of the mesh in mm.
     faces : (f, 3) int32 array
+        Triangles as indices into `vertices`.
 
     Returns
     -------
     labels : (f,) int32 array
-        Index into `planes`.
+        Region of each triangle, an index into `planes`.
     planes : list of Plane
+        Plane of each region.
     """
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -212,17 +227,23 @@ def round_regions(
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corners of the mesh in mm.
     faces : (f, 3) int32 array
+        Triangles as indices into `vertices`.
     labels : (f,) int32 array
+        Flat region of each triangle, from :func:`flat_regions`.
     planes : sequence of Plane
-        Both from :func:`flat_regions`.
+        Plane of each flat region, from :func:`flat_regions`.
     axes : sequence of Axis
+        Axes about which there may be round faces.
 
     Returns
     -------
     labels : (f,) int32 array
-        Index into `surfaces`. A round region spans less than half a turn or so.
+        Region of each triangle, an index into `surfaces`. A round region spans less than half a
+        turn or so.
     surfaces : list of Plane or Round
+        Surface of each region.
     """
     rims = _rims(faces, labels)
     corners_of = _corners_by_region(faces, labels, len(planes))
@@ -242,12 +263,21 @@ def sculpted_triangles(
 
     Parameters
     ----------
-    vertices, faces, labels, planes, axes
-        As for :func:`round_regions`.
+    vertices : (v, 3) float64 array
+        Corners of the mesh in mm.
+    faces : (f, 3) int32 array
+        Triangles as indices into `vertices`.
+    labels : (f,) int32 array
+        Flat region of each triangle, from :func:`flat_regions`.
+    planes : sequence of Plane
+        Plane of each flat region, from :func:`flat_regions`.
+    axes : sequence of Axis
+        Axes about which there may be round faces.
 
     Returns
     -------
     (f,) bool array
+        True for the sculpted triangles.
     """
     corners_of = _corners_by_region(faces, labels, len(planes))
     kept = np.array([max(abs(v) for v in plane.normal) > 1.0 - 1e-9 for plane in planes])

@@ -27,17 +27,21 @@ def thinned(
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corners of the mesh in mm.
     faces : (f, 3) int32 array
+        Triangles as indices into `vertices`.
     sculpted : (f,) bool array
         Triangles that may go. Corners of any other triangle stay where they are.
     tolerance_mm : float
-        No corner of the old mesh may be further than this from the new one, nor the other way.
+        Largest distance of a corner of the old mesh from the new one, and the other way, mm.
 
     Returns
     -------
-    vertices, faces
-        The mesh with the fewest triangles that is closed and within the bound; the mesh itself
-        if there is none.
+    vertices : (w, 3) float64 array
+        Corners in mm of the mesh with the fewest triangles that is closed and within the bound;
+        of the mesh itself if there is none.
+    faces : (g, 3) int32 array
+        Its triangles as indices into the new vertices.
 
     References
     ----------

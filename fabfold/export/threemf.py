@@ -44,6 +44,7 @@ from fabfold.joinery.bodies import Joinery
 
 __all__ = ["Layout", "posed", "write_3mf"]
 
+#: How the bodies are grouped in the file; see the description above.
 Layout = Literal["kit", "assembly", "apart"]
 
 #: Metadata names that the core specification knows; all others get a name space of their own.
@@ -74,13 +75,14 @@ def posed(joinery: Joinery, poses_mm: NDArray[np.float64]) -> Joinery:
     Parameters
     ----------
     joinery : Joinery
+        The printed bodies in shape A.
     poses_mm : (b, 4, 4) float64 array
         Rigid transform of each body, mm.
 
     Returns
     -------
     Joinery
-        For a print pose or a plate.
+        The moved bodies, for a print pose or a plate.
     """
     bodies = tuple(
         replace(body, vertices=body.vertices @ pose[:3, :3].T + pose[:3, 3])
@@ -104,16 +106,17 @@ def write_3mf(
     Parameters
     ----------
     path : Path
-        Ends in ``.3mf``.
+        File to write, ending in ``.3mf``.
     joinery : Joinery
-        Bodies in the place where they are to be printed; see :func:`posed`.
+        The bodies in the place where they are to be printed; see :func:`posed`.
     title : str
         Title of the file and name of the whole.
     metadata : mapping of str to str, optional
-        Written as given. Names that the 3MF core specification does not know are put into the name
-        space ``urn:fabfold:kit``. ``Application`` is ``fabfold`` unless given.
+        Facts about the file, written as given. Names that the 3MF core specification does not know
+        are put into the name space ``urn:fabfold:kit``. ``Application`` is ``fabfold`` unless
+        given.
     colours : (b, 3) uint8 array, optional
-        sRGB, one a body.
+        Colour of each body, sRGB.
     layout : {"kit", "assembly", "apart"}
         How the bodies are grouped; see the module's description.
     thumbnail : bytes, optional
@@ -148,8 +151,6 @@ def write_3mf(
         materials.AddMaterial(name, wrapper.RGBAToColor(*(int(c) for c in colour), 255))
         for name, colour in zip(names, colours, strict=True)
     ]
-    lowest = np.min([vertices.min(axis=0) for vertices, _ in meshes], axis=0)
-    place = _translation(lib3mf, -np.round(lowest.astype(float), _DECIMALS))
     model.SetBuildUUID(str(uuid.uuid5(space, "build")))
     bodies = []
     for name, mesh, paint in zip(names, meshes, paints, strict=True):
@@ -157,27 +158,35 @@ def write_3mf(
         body.SetObjectLevelProperty(materials.GetResourceID(), paint)
         body.SetUUID(str(uuid.uuid5(space, name)))
         bodies.append(body)
-    tops, settings = bodies, {}
+    built, settings = bodies, {}
     if layout == "kit":
         for body in bodies:
             # PrusaSlicer fails on objects of type "model" that are not built.
             body.SetType(lib3mf.ObjectType.Other)
         whole = _add_whole(lib3mf, model, title, meshes, materials.GetResourceID(), paints)
         settings = {"Slic3r_PE_model.config": _prusa_config(whole, title, names, meshes)}
-        tops = [whole]
+        built = [whole]
     elif layout == "assembly":
-        whole = model.AddComponentsObject()
-        whole.SetName(title)
-        for name, body in zip(names, bodies, strict=True):
-            component = whole.AddComponent(body, wrapper.GetIdentityTransform())
-            component.SetUUID(str(uuid.uuid5(space, f"component {name}")))
+        whole = _add_assembly(wrapper, model, title, names, bodies, space)
         settings = {"model_settings.config": _bambu_config(whole, title, names, bodies)}
-        tops = [whole]
+        built = [whole]
     if layout != "apart":
-        tops[0].SetUUID(str(uuid.uuid5(space, "kit")))
-    for index, top in enumerate(tops):
-        item = model.AddBuildItem(top, place)
+        built[0].SetUUID(str(uuid.uuid5(space, "kit")))
+    lowest = np.min([vertices.min(axis=0) for vertices, _ in meshes], axis=0)
+    place = _translation(lib3mf, -np.round(lowest.astype(float), _DECIMALS))
+    for index, entry in enumerate(built):
+        item = model.AddBuildItem(entry, place)
         item.SetUUID(str(uuid.uuid5(space, f"item {index}")))
+    _attach(model, settings, thumbnail)
+    writer = model.QueryWriter("3mf")
+    writer.SetDecimalPrecision(_DECIMALS)
+    with replacing(path) as temporary:
+        writer.WriteToFile(str(temporary))
+        temporary.write_bytes(_repacked(temporary.read_bytes()))
+
+
+def _attach(model: Any, settings: Mapping[str, str], thumbnail: bytes | None) -> None:
+    """Put files of slicer settings, by name, and a thumbnail into the package."""
     if settings:
         model.AddCustomContentType("config", "text/xml")
     for file_name, text in settings.items():
@@ -185,11 +194,6 @@ def write_3mf(
         attachment.ReadFromBuffer(text.encode("utf-8"))
     if thumbnail is not None:
         model.CreatePackageThumbnailAttachment().ReadFromBuffer(thumbnail)
-    writer = model.QueryWriter("3mf")
-    writer.SetDecimalPrecision(_DECIMALS)
-    with replacing(path) as temporary:
-        writer.WriteToFile(str(temporary))
-        temporary.write_bytes(_repacked(temporary.read_bytes()))
 
 
 def _repacked(package: bytes) -> bytes:
@@ -208,6 +212,7 @@ def _repacked(package: bytes) -> bytes:
 
 
 def _translation(lib3mf: Any, offset: NDArray[np.float64]) -> Any:
+    """A transform of lib3mf that moves by an offset (3,) in mm."""
     transform = lib3mf.Transform()
     for row in range(3):
         transform.Fields[row][row] = 1.0
@@ -216,6 +221,7 @@ def _translation(lib3mf: Any, offset: NDArray[np.float64]) -> Any:
 
 
 def _add_mesh(lib3mf: Any, model: Any, name: str, mesh: _Mesh) -> Any:
+    """Add a named mesh object to the model."""
     vertices, faces = mesh
     target = model.AddMeshObject()
     target.SetName(name)
@@ -236,6 +242,7 @@ def _add_mesh(lib3mf: Any, model: Any, name: str, mesh: _Mesh) -> Any:
 def _add_whole(
     lib3mf: Any, model: Any, title: str, meshes: list[_Mesh], materials: int, paints: list[int]
 ) -> Any:
+    """Add one mesh object that holds all bodies, each in its colour."""
     starts = np.cumsum([0] + [len(vertices) for vertices, _ in meshes])
     vertices = np.concatenate([vertices for vertices, _ in meshes])
     faces = np.concatenate([faces + s for (_, faces), s in zip(meshes, starts, strict=False)])
@@ -250,7 +257,20 @@ def _add_whole(
     return whole
 
 
+def _add_assembly(
+    wrapper: Any, model: Any, title: str, names: list[str], bodies: list[Any], space: uuid.UUID
+) -> Any:
+    """Add one object that holds all bodies as components, in their places."""
+    whole = model.AddComponentsObject()
+    whole.SetName(title)
+    for name, body in zip(names, bodies, strict=True):
+        component = whole.AddComponent(body, wrapper.GetIdentityTransform())
+        component.SetUUID(str(uuid.uuid5(space, f"component {name}")))
+    return whole
+
+
 def _prusa_config(whole: Any, title: str, names: list[str], meshes: list[_Mesh]) -> str:
+    """The file by which PrusaSlicer and SuperSlicer see the bodies as named parts of one object."""
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         "<config>",
@@ -271,6 +291,7 @@ def _prusa_config(whole: Any, title: str, names: list[str], meshes: list[_Mesh])
 
 
 def _bambu_config(whole: Any, title: str, names: list[str], bodies: list[Any]) -> str:
+    """The file by which Bambu Studio and OrcaSlicer see the bodies as named parts."""
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         "<config>",

@@ -1,4 +1,4 @@
-"""Printed bodies: what the joinery stage hands on."""
+"""The printed bodies of a kit as meshes, and the figures of how they were made."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ class BodyMesh:
     name : str
         Name of the body in ``tree.json``.
     vertices : (v, 3) float64 array
-        In mm, shape A.
+        Corners of the mesh in mm, shape A.
     faces : (f, 3) int32 array
-        One closed, outward-oriented two-manifold piece.
+        Triangles as indices into `vertices`: one closed two-manifold, counter-clockwise seen from
+        outside.
     """
 
     name: str
@@ -44,31 +45,35 @@ class Joinery:
     Attributes
     ----------
     bodies : tuple of BodyMesh
-        In the order of ``FoldTree.bodies``.
+        The meshes, in the order of ``FoldTree.bodies``.
     voxel_mm : float
         Side of a voxel in mm.
     origin_mm : (3,) tuple of float
-        ``origin_mm + voxel_mm * lattice`` gives mm in shape A.
+        Where the lattice origin lies in shape A, mm: ``origin_mm + voxel_mm * lattice`` gives mm.
     clearance_mm : float
-        Gap between bodies and normal clearance in the hinges.
-    barrel_radius_mm, pin_radius_mm : float
-        Of every single hinge.
+        Gap between bodies and normal clearance in the hinges, mm.
+    barrel_radius_mm : float
+        Radius of every barrel, mm.
+    pin_radius_mm : float
+        Radius of the pin of every single hinge, mm.
     knuckles : int
-        Knuckles on a hinge.
+        Number of knuckles of every single hinge.
     carved_cells : int
-        Cells of bodies that lost material to grooves for the barrels of other hinges.
+        Number of cells that lost material to grooves for barrels and pockets for link plates.
     carved_mm3 : float
-        That material.
+        Volume of that material in mm³.
     dropped_mm3 : float
-        Loose crumbs of material that were left out because nothing carried them.
+        Volume in mm³ of the loose fragments that were left out because nothing carried them.
     struts : int
-        Bars added inside cells to join material that the cut left apart.
+        Number of bars added inside cells to join material that the cut left apart.
     notes : tuple of str
         What else was done, in a maker's words.
     rounded_cells : int
-        Cells that lost corners so that they pass each other on the folding path.
-    rounded_skin_mm3, rounded_inside_mm3 : float
-        What they lost, at the model's surface and inside it.
+        Number of cells that lost corners so that they pass each other on the folding path.
+    rounded_skin_mm3 : float
+        Volume in mm³ that these corners had at the model's surface.
+    rounded_inside_mm3 : float
+        Volume in mm³ that these corners had inside the model.
     """
 
     bodies: tuple[BodyMesh, ...]

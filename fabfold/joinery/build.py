@@ -12,17 +12,19 @@ from numpy.typing import NDArray
 from fabfold.errors import GeometryError
 from fabfold.fold.barrels import first_encounter
 from fabfold.fold.motion import Motion
+from fabfold.joinery.barrel_sweeps import Sweep, barrel_sweeps
 from fabfold.joinery.bodies import BodyMesh, Joinery
-from fabfold.joinery.carving import Carved, carve
-from fabfold.joinery.cells import eroded_cells, eroded_room, model_manifold
-from fabfold.joinery.cutting import Cut, less, meeting, united
-from fabfold.joinery.grooves import Passage, passages
-from fabfold.joinery.hinge_placement import fittings
+from fabfold.joinery.booleans import effective_tools, subtract, union
+from fabfold.joinery.carving import CarvedMaterial, carve
+from fabfold.joinery.cells import eroded_cells, model_manifold
+from fabfold.joinery.cutting import BodyCutter
+from fabfold.joinery.hinge_placement import place_hinges
 from fabfold.joinery.links import link_body
-from fabfold.joinery.one_piece import CRUMB_SHARE, MendTally, one_piece
-from fabfold.joinery.pockets import plate_passages
-from fabfold.joinery.sizes import HingeSize, hinge_size, strut_width
-from fabfold.joinery.soundness import finish_mesh
+from fabfold.joinery.one_piece import connect_pieces
+from fabfold.joinery.pockets import plate_sweeps
+from fabfold.joinery.sizes import HingeSize, hinge_size
+from fabfold.joinery.soundness import printable_body
+from fabfold.joinery.tally import BuildTally
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import WHOLE
@@ -60,21 +62,28 @@ def build_bodies(
     Parameters
     ----------
     voxels : Voxels
-        In the order of the voxels of `tree`.
+        The voxels and the warped model, in the order of the voxels of `tree`.
     tree : FoldTree
+        The bodies and the hinges between them.
     motion : Motion
         The folding path from A to B, one hinge a move.
     voxel_mm : float
-        Side of a voxel.
+        Side of a voxel in mm.
     clearance_mm : float
-        Gap between bodies, and normal clearance in the hinges.
-    barrel_radius_mm, pin_radius_mm, knuckles : optional
-        Of the hinges; derived from `voxel_mm` and `clearance_mm` when left out.
+        Gap between bodies and normal clearance in the hinges, mm.
+    barrel_radius_mm : float, optional
+        Radius of the barrels in mm; derived from `voxel_mm` and `clearance_mm` by default.
+    pin_radius_mm : float, optional
+        Radius of the pins in mm; derived in the same way by default.
+    knuckles : int, optional
+        Number of knuckles of a single hinge; 3 by default.
     progress : Progress, optional
+        Is told how far the work is.
 
     Returns
     -------
     Joinery
+        The bodies in mm, shape A, with the figures of how they were made.
 
     Raises
     ------
@@ -83,8 +92,7 @@ def build_bodies(
     GeometryError
         If this tree cannot be built: a barrel passes through the knuckles of another hinge, a
         double hinge does not fit, a link is cut apart, cells cannot pass each other without
-        cutting a hinge, or a body cannot be made one piece. The
-        message names the bodies.
+        cutting a hinge, or a body cannot be made one piece. The message names the bodies.
 
     References
     ----------
@@ -94,36 +102,37 @@ def build_bodies(
     _check_inputs(voxels, tree, motion, voxel_mm, clearance_mm)
     size = hinge_size(voxel_mm, clearance_mm, barrel_radius_mm, pin_radius_mm, knuckles)
     told.update(0.0, "preparing the model and the hinges")
-    _refuse_encounters(tree, motion, size, voxel_mm)
+    _refuse_colliding_barrels(tree, motion, size, voxel_mm)
     model = model_manifold(voxels, voxel_mm)
-    fitted = fittings(tree, motion, size, voxel_mm)
-    ways: list[list[Passage]] = [[] for _ in tree.bodies]
-    for passage in passages(tree, motion, 1.05 * size.reach_mm / voxel_mm):
-        ways[passage.body].append(passage)
-    plate_ways: list[list[Passage]] = [[] for _ in tree.bodies]
-    for passage in plate_passages(
-        tree, motion, fitted.plates, voxel_mm=voxel_mm, clearance_mm=clearance_mm
-    ):
-        plate_ways[passage.body].append(passage)
-    rounded = carve(
+    hinges = place_hinges(tree, motion, size, voxel_mm)
+    past_barrels = _by_body(tree, barrel_sweeps(tree, motion, 1.05 * size.reach_mm / voxel_mm))
+    past_plates = _by_body(
+        tree,
+        plate_sweeps(tree, motion, hinges.plates, voxel_mm=voxel_mm, clearance_mm=clearance_mm),
+    )
+    carved = carve(
         voxels,
         tree,
         motion,
         model,
-        [[(item.half, item.carve) for item in own] for own in fitted.halves],
+        hinges.halves,
         voxel_mm=voxel_mm,
         clearance_mm=clearance_mm,
     )
-    tally = MendTally()
+    tally = BuildTally()
     origin = voxel_mm * (0.5 - tree.source.min(axis=0).astype(float))
     meshes = []
     for index, body in enumerate(tree.bodies):
         told.update(index / len(tree.bodies), f"cutting {body.name}")
-        cut = Cut(index, tree, fitted, ways[index], plate_ways[index], size, voxel_mm)
-        solid = (
-            link_body(cut, tally) if index in fitted.plates else _body(cut, model, rounded, tally)
+        cutter = BodyCutter(
+            index, tree, hinges, past_barrels[index], past_plates[index], size, voxel_mm
         )
-        vertices, faces = finish_mesh(solid, body.name, origin)
+        solid = (
+            link_body(cutter, tally)
+            if index in hinges.plates
+            else _voxel_body(cutter, model, carved, tally)
+        )
+        vertices, faces = printable_body(solid, body.name, origin)
         meshes.append(BodyMesh(body.name, vertices, faces))
     told.update(1.0, f"{len(meshes)} bodies, {tally.struts} struts")
     x, y, z = origin.tolist()
@@ -139,46 +148,19 @@ def build_bodies(
         carved_mm3=round(tally.carved_mm3, 3),
         dropped_mm3=round(tally.dropped_mm3, 3),
         struts=tally.struts,
-        notes=(*rounded.notes(), *_notes(tally, voxel_mm, len(fitted.plates))),
-        rounded_cells=rounded.cells,
-        rounded_skin_mm3=round(rounded.skin_mm3, 3),
-        rounded_inside_mm3=round(rounded.inside_mm3, 3),
+        notes=(*carved.notes(), *tally.notes(voxel_mm, len(hinges.plates))),
+        rounded_cells=carved.cells,
+        rounded_skin_mm3=round(carved.skin_mm3, 3),
+        rounded_inside_mm3=round(carved.inside_mm3, 3),
     )
 
 
-def _notes(tally: MendTally, voxel_mm: float, links: int) -> tuple[str, ...]:
-    notes = []
-    if tally.carved_cells:
-        notes.append(
-            f"{tally.carved_mm3:.0f} mm³ taken out of {tally.carved_cells} cells so that hinge "
-            + ("barrels and link plates can pass" if links else "barrels can pass")
-        )
-    if tally.links_mm3 > 0.01:
-        notes.append(
-            f"{tally.links_mm3:.0f} mm³ taken out of {tally.links_cut} of {links} link plates so "
-            "that hinge barrels and other links can pass"
-        )
-    if tally.shared_cells:
-        notes.append(
-            f"{tally.shared_cells} voxels share {tally.shared_cells // 2} cells of the box, two "
-            f"and two; {tally.shared_mm3:.0f} mm³ cut off them so that each keeps to its eighths"
-        )
-    if tally.hollows:
-        notes.append(
-            f"{tally.hollows} closed hollows filled, {tally.filled_mm3:.0f} mm³ in all: "
-            "nothing could be cleaned out of them"
-        )
-    if tally.crumbs:
-        notes.append(
-            f"{tally.crumbs} loose crumbs left out, {tally.dropped_mm3:.0f} mm³ in all "
-            f"(each below {CRUMB_SHARE * voxel_mm**3:.0f} mm³)"
-        )
-    if tally.struts:
-        notes.append(
-            f"{tally.struts} struts of {strut_width(voxel_mm):.1f} mm added in "
-            + ", ".join(tally.strutted)
-        )
-    return tuple(notes)
+def _by_body(tree: FoldTree, sweeps: Iterable[Sweep]) -> list[list[Sweep]]:
+    """The sweeps past each body, by index of the body."""
+    found: list[list[Sweep]] = [[] for _ in tree.bodies]
+    for sweep in sweeps:
+        found[sweep.body].append(sweep)
+    return found
 
 
 def _check_inputs(
@@ -203,7 +185,9 @@ def _check_inputs(
             )
 
 
-def _refuse_encounters(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm: float) -> None:
+def _refuse_colliding_barrels(
+    tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm: float
+) -> None:
     """Refuse a path on which two barrels run into each other, before anything is cut."""
     found = first_encounter(
         tree,
@@ -220,79 +204,78 @@ def _refuse_encounters(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm
         )
 
 
-def _body(
-    cut: Cut, model: manifold3d.Manifold, rounded: Carved, tally: MendTally
+def _voxel_body(
+    cutter: BodyCutter, model: manifold3d.Manifold, carved: CarvedMaterial, tally: BuildTally
 ) -> manifold3d.Manifold:
-    """One body as one connected solid, lattice origin at zero."""
-    voxel_mm = cut.voxel_mm
-    cells = cut.tree.source[list(cut.tree.bodies[cut.index].voxels)]
-    room = _room(cut, cells, model, tally)
-    own = cut.fitted.halves[cut.index]
-    carves = [item.carve for item in own]
-    rounds = rounded.tools.get(cut.index, [])
-    material = less(model ^ room, [*carves, *rounds])
+    """A body of voxels as one connected solid, mm, lattice origin at zero."""
+    cells = cutter.tree.source[list(cutter.tree.bodies[cutter.index].voxels)]
+    space = _body_space(cutter, cells, model, tally)
+    own = cutter.hinges.halves[cutter.index]
+    cutouts = [placed.cutout for placed in own]
+    carving_tools = carved.tools.get(cutter.index, [])
+    material = subtract(model ^ space, [*cutouts, *carving_tools])
     halves = [
-        less(item.half, [other.carve for other in own if other.hinge != item.hinge]) for item in own
+        subtract(placed.half, [other.cutout for other in own if other.hinge != placed.hinge])
+        for placed in own
     ]
-    grooves = cut.grooves(*cut.boxes(cells, halves))
+    grooves = cutter.groove_tools(*cutter.boxes(cells, halves))
     # Plates keep off knuckles, and all else is inside the cells.
-    pockets = cut.pockets(*cut.boxes(cells, []))
-    in_material = meeting([*grooves, *pockets], material)
-    if in_material:
-        lost, material = material.split(united(in_material))
+    pockets = cutter.pocket_tools(*cutter.boxes(cells, []))
+    tools = effective_tools([*grooves, *pockets], material)
+    if tools:
+        lost, material = material.split(union(tools))
         volume = lost.volume()
         if volume > 0.01:
             tally.carved_mm3 += volume
-            names = [cut.tree.hinges[h].name for h, _ in grooves]
-            names += [cut.tree.bodies[b].name for b, _ in pockets]
-            tally.carved_cells += _count_cells(cut, lost, cells, names)
-    halves = [less(cut.half(half, grooves, pockets), rounds) for half in halves]
+            names = [cutter.tree.hinges[h].name for h, _ in grooves]
+            names += [cutter.tree.bodies[b].name for b, _ in pockets]
+            tally.carved_cells += _count_cells(cutter, lost, cells, names)
+    halves = [subtract(cutter.cut_half(half, grooves, pockets), carving_tools) for half in halves]
 
     @cache
-    def free() -> manifold3d.Manifold:
-        shut = [*rounds, *rounded.shut.get(cut.index, [])]
-        return less(room, [*carves, *shut, *meeting([*grooves, *pockets], room)])
+    def strut_space() -> manifold3d.Manifold:
+        """Where struts of the body may run."""
+        keep_outs = [*carving_tools, *carved.strut_keep_outs.get(cutter.index, [])]
+        passing = effective_tools([*grooves, *pockets], space)
+        return subtract(space, [*cutouts, *keep_outs, *passing])
 
-    return one_piece(cut.name, cells, free, material, halves, voxel_mm, tally)
+    return connect_pieces(cutter.name, cells, strut_space, material, halves, cutter.voxel_mm, tally)
 
 
-def _room(
-    cut: Cut, cells: NDArray[np.int32], model: manifold3d.Manifold, tally: MendTally
+def _body_space(
+    cutter: BodyCutter, cells: NDArray[np.int32], model: manifold3d.Manifold, tally: BuildTally
 ) -> manifold3d.Manifold:
-    """Where the body may be: its cells, and of those that are shared in B its own eighths."""
-    inset = cut.size.clearance_mm / 2
-    whole = eroded_cells(cells, cut.voxel_mm, inset)
-    if cut.tree.octants is None:
+    """Where the body may be: its cells, and of those that are shared in B its own octants."""
+    inset = cutter.size.clearance_mm / 2
+    whole = eroded_cells(cells, cutter.voxel_mm, inset)
+    if cutter.tree.octants is None:
         return whole
-    octants = cut.tree.octants[list(cut.tree.bodies[cut.index].voxels)]
+    octants = cutter.tree.octants[list(cutter.tree.bodies[cutter.index].voxels)]
     if (octants == WHOLE).all():
         return whole
-    room = eroded_room(cells, octants, cut.voxel_mm, inset)
+    own = eroded_cells(cells, cutter.voxel_mm, inset, octants)
     tally.shared_cells += int((octants != WHOLE).sum())
-    tally.shared_mm3 += (model ^ (whole - room)).volume()
-    return room
+    tally.shared_mm3 += (model ^ (whole - own)).volume()
+    return own
 
 
 def _count_cells(
-    cut: Cut, lost: manifold3d.Manifold, cells: NDArray[np.int32], culprits: Iterable[str]
+    cutter: BodyCutter, lost: manifold3d.Manifold, cells: NDArray[np.int32], culprits: Iterable[str]
 ) -> int:
-    """Number of cells in which a lost solid has volume.
+    """Number of cells (m, 3) in which a lost solid has volume.
 
-    Raises
-    ------
-    GeometryError
-        If it is most of a cell: the path runs through the body instead of past it.
+    Most of a cell is refused: the path then runs through the body instead of past it.
     """
     import manifold3d
 
     count = 0
-    side = cut.voxel_mm
+    side = cutter.voxel_mm
     cube = manifold3d.Manifold.cube((side, side, side), True)
     for cell in cells:
         volume = (lost ^ cube.translate(tuple(cell * side))).volume()
         if volume > _MOST_OF_A_CELL * side**3:
             raise GeometryError(
-                f"{cut.name}: {', '.join(dict.fromkeys(culprits))} would take "
+                f"{cutter.name}: {', '.join(dict.fromkeys(culprits))} would take "
                 f"{100 * volume / side**3:.0f} % of its cell {cell.tolist()} on the folding path"
             )
         count += volume > 0.01

@@ -1,4 +1,4 @@
-"""Cutting the warped model into the cells of each body.
+"""The cells of a body as solids, and solids as points of a grid.
 
 All of joinery works in a frame of its own: millimetres, axes and origin of the lattice of shape A,
 so that the lattice point ``p`` lies at ``voxel_mm * p``. The origin of the kit is added at the end.
@@ -19,7 +19,7 @@ from fabfold.voxels.voxel_model import Voxels
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["as_manifold", "eroded_cells", "eroded_room", "model_manifold", "occupancy"]
+__all__ = ["as_manifold", "eroded_cells", "model_manifold", "occupancy"]
 
 #: Shift of the scan lines in `occupancy`, as a share of the pitch: rays that run through the
 #: vertices and edges of axis-aligned boxes would meet degenerate hits.
@@ -29,14 +29,21 @@ _SCAN_SHIFT = (0.0131, 0.0173)
 def as_manifold(
     vertices: NDArray[np.float64], faces: NDArray[np.generic], what: str
 ) -> manifold3d.Manifold:
-    """Exact-boolean solid of a closed mesh.
+    """Solid of a closed mesh, for exact booleans.
 
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corners of the mesh, in any unit.
     faces : (f, 3) integer array
+        Triangles as indices into `vertices`, counter-clockwise seen from outside.
     what : str
         Name of the mesh for the error message.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In the unit of `vertices`.
 
     Raises
     ------
@@ -60,30 +67,64 @@ def as_manifold(
 
 
 def model_manifold(voxels: Voxels, voxel_mm: float) -> manifold3d.Manifold:
-    """The warped model in mm, lattice origin at zero."""
+    """The warped model as a solid.
+
+    Parameters
+    ----------
+    voxels : Voxels
+        The voxels with the warped model's mesh, lattice units.
+    voxel_mm : float
+        Side of a voxel in mm.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In mm, lattice origin at zero.
+    """
     return as_manifold(voxels.vertices * voxel_mm, voxels.faces, "warped model")
 
 
-def eroded_cells(cells: NDArray[np.int32], voxel_mm: float, inset_mm: float) -> manifold3d.Manifold:
+def eroded_cells(
+    cells: NDArray[np.int32],
+    voxel_mm: float,
+    inset_mm: float,
+    octants: NDArray[np.uint8] | None = None,
+) -> manifold3d.Manifold:
     """Cells of a body less everything within `inset_mm` of a cell that is not its own.
 
-    Distance is measured by the largest coordinate difference, so the result is the union of boxes:
-    one for each cell, each pair that shares a face, each square of four and each cube of eight,
-    every one inset on all sides. Where cells meet, these boxes overlap and no gap is left.
+    Distance is measured by the largest coordinate difference.
 
     Parameters
     ----------
     cells : (m, 3) int32 array
         The body's cells in lattice units.
     voxel_mm : float
-        Side of a cell.
+        Side of a cell in mm.
     inset_mm : float
-        Half the gap between bodies.
+        Half the gap between bodies in mm.
+    octants : (m,) uint8 array, optional
+        Which octants of each cell are the body's own, see ``FoldTree.octants``; all by default.
 
     Returns
     -------
     manifold3d.Manifold
-        In mm.
+        In mm, lattice origin at zero.
+    """
+    if octants is None or (octants == WHOLE).all():
+        return _eroded_cubes(cells, voxel_mm, inset_mm)
+    kept = np.argwhere(unpacked(octants))
+    halves = (2 * cells[kept[:, 0]] + kept[:, 1:]).astype(np.int32)
+    # The half cell 0 begins where the cell 0 does, so its centre is a quarter of a cell below 0.
+    octant_solid = _eroded_cubes(halves, voxel_mm / 2, inset_mm)
+    return octant_solid.translate((-voxel_mm / 4,) * 3)
+
+
+def _eroded_cubes(cells: NDArray[np.int32], side_mm: float, inset_mm: float) -> manifold3d.Manifold:
+    """Cubes of a lattice (m, 3) less everything near a cube that is not among them, mm.
+
+    The result is the union of boxes: one for each cube, each pair that shares a face, each square
+    of four and each block of eight, every one inset on all sides. Where cubes meet, these boxes
+    overlap and no gap is left.
     """
     import manifold3d
 
@@ -97,46 +138,16 @@ def eroded_cells(cells: NDArray[np.int32], voxel_mm: float, inset_mm: float) -> 
             # A larger block that holds this one makes it superfluous.
             if _inside_larger(cell, extent, own):
                 continue
-            size = np.array(extent) * voxel_mm - 2 * inset_mm
-            corner = (np.array(cell) - 0.5) * voxel_mm + inset_mm
+            size = np.array(extent) * side_mm - 2 * inset_mm
+            corner = (np.array(cell) - 0.5) * side_mm + inset_mm
             boxes.append(manifold3d.Manifold.cube(tuple(size)).translate(tuple(corner)))
     return manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add)
-
-
-def eroded_room(
-    cells: NDArray[np.int32],
-    octants: NDArray[np.uint8] | None,
-    voxel_mm: float,
-    inset_mm: float,
-) -> manifold3d.Manifold:
-    """As :func:`eroded_cells`, of a body that may have some of its cells in part only.
-
-    Parameters
-    ----------
-    cells : (m, 3) int32 array
-        The body's cells in lattice units.
-    octants : (m,) uint8 array or None
-        Which eighths of each cell are its own, see ``FoldTree.octants``; None for all.
-    voxel_mm, inset_mm : float
-
-    Returns
-    -------
-    manifold3d.Manifold
-        In mm.
-    """
-    if octants is None or (octants == WHOLE).all():
-        return eroded_cells(cells, voxel_mm, inset_mm)
-    kept = np.argwhere(unpacked(octants))
-    halves = (2 * cells[kept[:, 0]] + kept[:, 1:]).astype(np.int32)
-    # The half cell 0 begins where the cell 0 does, so its centre is a quarter of a cell below 0.
-    room = eroded_cells(halves, voxel_mm / 2, inset_mm)
-    return room.translate((-voxel_mm / 4,) * 3)
 
 
 def _inside_larger(
     cell: tuple[int, ...], extent: tuple[int, ...], own: set[tuple[int, ...]]
 ) -> bool:
-    """Whether growing the block along one of its thin axes stays within the body's cells."""
+    """Whether the block, grown along one of its thin axes, stays within the body's cells."""
     for axis in range(3):
         if extent[axis] == 2:
             continue
@@ -163,16 +174,18 @@ def occupancy(
     Parameters
     ----------
     solid : manifold3d.Manifold
+        The solid, in mm.
     corner : (3,) float64 array
         First grid point in mm.
     pitch : float
         Grid spacing in mm.
-    shape : tuple of int
+    shape : (int, int, int)
         Number of grid points along x, y and z.
 
     Returns
     -------
-    bool array of the given shape
+    (x, y, z) bool array
+        True at the points inside.
     """
     grid = np.zeros(shape, dtype=bool)
     if solid.is_empty():

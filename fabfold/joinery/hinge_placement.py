@@ -1,4 +1,4 @@
-"""Putting hinges on their lattice edges."""
+"""Put the hinges of a tree on their lattice edges."""
 
 from __future__ import annotations
 
@@ -19,70 +19,80 @@ if TYPE_CHECKING:
 
     from hinges.mesh import MeshPart
 
-__all__ = ["Fittings", "Half", "Plate", "hinge_frames", "knuckle_zone"]
+__all__ = [
+    "LinkPlate",
+    "PlacedHalf",
+    "PlacedHinges",
+    "barrel_solid",
+    "double_layout",
+    "hinge_frames",
+    "place_hinges",
+]
 
 #: Quarter turns are whole to this many degrees.
 _ANGLE_TOLERANCE = 1e-6
 
 
-class Half(NamedTuple):
-    """What one hinge adds to a body and takes from it first; mm, lattice origin at zero."""
-
-    hinge: int
-    half: manifold3d.Manifold
-    carve: manifold3d.Manifold
-
-
-@dataclass(frozen=True)
-class Plate:
-    """The link plate of a double hinge, in its place in A, lattice origin at zero.
+class PlacedHalf(NamedTuple):
+    """Half of a hinge in its place in A, lattice origin at zero.
 
     Attributes
     ----------
-    body : int
-        Index of the link.
-    hinges : tuple of int
-        The hinge to its parent and the hinge to its child.
-    bodies : tuple of int
-        The parent and the child, which the hinge itself lets the plate into.
-    cells : (2, 3) int32 array
-        The cells on both sides of the plate: the parent's and the child's voxel, lattice units.
-    link : manifold3d.Manifold
-        Plate and knuckles, mm.
-    corners : (k, 3) float64 array
-        Of the plate alone, mm.
-    frame : (3, 3) float64 array
-        Columns: the plate's normal and its two directions in the face.
-    thickness_mm : float
-    one_line : bool
-        Whether both axes lie on one edge of the face.
+    hinge : int
+        Index of the hinge.
+    half : manifold3d.Manifold
+        What the hinge adds to the body, mm.
+    cutout : manifold3d.Manifold
+        What the hinge takes from the body before that, mm.
     """
 
-    body: int
-    hinges: tuple[int, int]
-    bodies: tuple[int, int]
-    cells: NDArray[np.int32]
-    link: manifold3d.Manifold
-    corners: NDArray[np.float64]
-    frame: NDArray[np.float64]
-    thickness_mm: float
-    one_line: bool
+    hinge: int
+    half: manifold3d.Manifold
+    cutout: manifold3d.Manifold
 
 
 @dataclass(frozen=True)
-class Fittings:
+class LinkPlate:
+    """The link plate of a double hinge in its place in A, lattice origin at zero.
+
+    Attributes
+    ----------
+    hinges : (int, int)
+        Indices of the hinge to the parent and of the hinge to the child.
+    bodies : (int, int)
+        Indices of the parent and of the child, which the hinge itself lets the plate into.
+    cells : (2, 3) int32 array
+        The cells on both sides of the plate: the parent's and the child's voxel, lattice units.
+    solid : manifold3d.Manifold
+        Plate and knuckles, mm.
+    corners : (k, 3) float64 array
+        Corners of the plate without knuckles, mm.
+    frame : (3, 3) float64 array
+        Columns: unit vectors along the plate's normal and along its two directions in the face.
+    """
+
+    hinges: tuple[int, int]
+    bodies: tuple[int, int]
+    cells: NDArray[np.int32]
+    solid: manifold3d.Manifold
+    corners: NDArray[np.float64]
+    frame: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlacedHinges:
     """All hinges of a tree in their places.
 
     Attributes
     ----------
-    halves : list of lists of Half
-        Of each body; links have none, they are `plates`.
-    plates : dict of int to Plate
-        By index of the link.
+    halves : list of list of PlacedHalf
+        The halves of each body, by index of the body; a link has none.
+    plates : dict of int to LinkPlate
+        The plate of each link, by index of the link.
     """
 
-    halves: list[list[Half]]
-    plates: dict[int, Plate]
+    halves: list[list[PlacedHalf]]
+    plates: dict[int, LinkPlate]
 
 
 def hinge_frames(tree: FoldTree) -> NDArray[np.float64]:
@@ -91,13 +101,14 @@ def hinge_frames(tree: FoldTree) -> NDArray[np.float64]:
     Parameters
     ----------
     tree : FoldTree
+        The bodies and their hinges.
 
     Returns
     -------
     (h, 3, 4) float64 array
-        Columns x (from the parent's cell to the child's), y (outwards, from the middle of the
-        shared face to the hinged edge), z = x × y (the axis) and the origin in the middle of the
-        edge, lattice units.
+        Columns: unit vectors x (from the parent's cell to the child's), y (outwards, from the
+        middle of the shared face to the hinged edge) and z = x × y (the axis), and the origin in
+        the middle of the edge, lattice units.
 
     Raises
     ------
@@ -126,20 +137,24 @@ def hinge_frames(tree: FoldTree) -> NDArray[np.float64]:
     return frames
 
 
-def fittings(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm: float) -> Fittings:
-    """The solids of all hinges of a tree.
+def place_hinges(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm: float) -> PlacedHinges:
+    """The solids of all hinges of a tree, each on its lattice edge.
 
     Parameters
     ----------
     tree : FoldTree
+        The bodies and their hinges.
     motion : Motion
-        Tells how far each axis of a double hinge turns.
+        The folding path; it tells how far each axis of a double hinge turns.
     size : HingeSize
+        Size and pieces of the hinges.
     voxel_mm : float
+        Side of a voxel in mm.
 
     Returns
     -------
-    Fittings
+    PlacedHinges
+        Halves of all bodies and plates of all links, mm.
 
     Raises
     ------
@@ -147,7 +162,7 @@ def fittings(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm: float) -
         If a hinge is off its edge, an axis turns against its face, or a double hinge does not fit.
     """
     single = size.meshes
-    blanks = [
+    pieces = [
         _solid(part)
         for part in (
             single.parent_half,
@@ -157,34 +172,34 @@ def fittings(tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm: float) -
         )
     ]
     frames = hinge_frames(tree)
-    made = Fittings([[] for _ in tree.bodies], {})
+    placed = PlacedHinges([[] for _ in tree.bodies], {})
     for edge in tree.edges:
         if edge.kind == "S":
             (h,) = edge.hinges
             transform = frames[h].copy()
             transform[:, 3] *= voxel_mm
-            half, other, carve, other_carve = (blank.transform(transform) for blank in blanks)
-            made.halves[tree.hinges[h].parent].append(Half(h, half, carve))
-            made.halves[tree.hinges[h].child].append(Half(h, other, other_carve))
+            half, other, cutout, other_cutout = (piece.transform(transform) for piece in pieces)
+            placed.halves[tree.hinges[h].parent].append(PlacedHalf(h, half, cutout))
+            placed.halves[tree.hinges[h].child].append(PlacedHalf(h, other, other_cutout))
         elif edge.kind == "D":
-            _double(tree, motion, edge, frames, size, voxel_mm, made)
-    for halves in made.halves:
+            _place_double(tree, motion, edge, frames, size, voxel_mm, placed)
+    for halves in placed.halves:
         halves.sort(key=lambda item: item.hinge)
-    return made
+    return placed
 
 
 def _solid(part: MeshPart) -> manifold3d.Manifold:
     return as_manifold(part.vertices, part.faces, "hinge piece")
 
 
-def _double(
+def _place_double(
     tree: FoldTree,
     motion: Motion,
     edge: Edge,
     frames: NDArray[np.float64],
     size: HingeSize,
     voxel_mm: float,
-    made: Fittings,
+    placed: PlacedHinges,
 ) -> None:
     """Place the pieces of one double hinge."""
     from hinges.exceptions import HingeError
@@ -194,9 +209,9 @@ def _double(
     link = tree.hinges[first].child
     if tree.hinges[second].parent != link or tree.bodies[link].voxels:
         raise GeometryError(f"{joint} has no link between its two hinges")
-    name, turns = double_layout(tree, motion, edge, frames)
+    second_edge, turns = double_layout(tree, motion, edge, frames)
     try:
-        meshes = size.double(name, turns)
+        meshes = size.double(second_edge, turns)
     except HingeError as error:
         degrees = " and ".join(f"{turn:g}°" for turn in turns)
         raise GeometryError(
@@ -207,19 +222,16 @@ def _double(
     frame[:, 3] = voxel_mm * (tree.source[edge.parent] + frame[:, 0] / 2)
     parent, child = tree.hinges[first].parent, tree.hinges[second].child
     parts = (meshes.parent_half, meshes.parent_carve, meshes.child_half, meshes.child_carve)
-    half, carve, other, other_carve = (_solid(part).transform(frame) for part in parts)
-    made.halves[parent].append(Half(first, half, carve))
-    made.halves[child].append(Half(second, other, other_carve))
-    made.plates[link] = Plate(
-        body=link,
+    half, cutout, other, other_cutout = (_solid(part).transform(frame) for part in parts)
+    placed.halves[parent].append(PlacedHalf(first, half, cutout))
+    placed.halves[child].append(PlacedHalf(second, other, other_cutout))
+    placed.plates[link] = LinkPlate(
         hinges=(first, second),
         bodies=(parent, child),
         cells=tree.source[[edge.parent, edge.child]],
-        link=_solid(meshes.link).transform(frame),
+        solid=_solid(meshes.link).transform(frame),
         corners=meshes.plate.vertices @ frame[:, :3].T + frame[:, 3],
         frame=frame[:, :3],
-        thickness_mm=meshes.plate_mm,
-        one_line=name == "+y",
     )
 
 
@@ -231,18 +243,20 @@ def double_layout(
     Parameters
     ----------
     tree : FoldTree
+        The bodies and their hinges.
     motion : Motion
+        The folding path; it tells how far each axis turns.
     edge : Edge
-        Of kind "D".
+        The edge of the double hinge, of kind "D".
     frames : (h, 3, 4) float64 array
-        From :func:`hinge_frames`.
+        Frame of every hinge, from :func:`hinge_frames`.
 
     Returns
     -------
     second : str
         Edge of the second axis: "+y", "-y", "+z" or "-z".
     turns : (float, float)
-        How far each axis turns on the path, in degrees: 90, 180 or 270.
+        How far each axis turns on the path: 90, 180 or 270 degrees.
 
     Raises
     ------
@@ -269,10 +283,10 @@ def double_layout(
     return ("-" if out[axis] < 0 else "+") + "xyz"[axis], (turns[0], turns[1])
 
 
-def knuckle_zone(
-    hinge: Hinge, size: HingeSize, voxel_mm: float, spare_mm: float = 0.08
+def barrel_solid(
+    hinge: Hinge, size: HingeSize, voxel_mm: float, inset_mm: float = 0.08
 ) -> manifold3d.Manifold:
-    """The barrel of a hinge as one cylinder, a little smaller than it is.
+    """The barrel of a hinge, all of its knuckles, as one cylinder that is a little smaller.
 
     A groove that only just reaches a knuckle's end or skin (by the thickness that groove tools
     have to spare) must not count as a cut.
@@ -280,16 +294,24 @@ def knuckle_zone(
     Parameters
     ----------
     hinge : Hinge
+        The hinge in shape A.
     size : HingeSize
+        Size of the hinge.
     voxel_mm : float
-    spare_mm : float
-        How much smaller; larger when negative.
+        Side of a voxel in mm.
+    inset_mm : float
+        How much smaller the cylinder is than the barrel on every side, mm; larger when negative.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In mm, lattice origin at zero.
     """
     import manifold3d
 
-    length = voxel_mm - 2 * (size.reach_mm + spare_mm)
-    radius = size.barrel_radius_mm - spare_mm
-    if spare_mm < 0.0:
+    length = voxel_mm - 2 * (size.reach_mm + inset_mm)
+    radius = size.barrel_radius_mm - inset_mm
+    if inset_mm < 0.0:
         radius /= np.cos(np.pi / 32)
     rod = manifold3d.Manifold.cylinder(length, radius, -1.0, 32, True)
     axis = np.array(hinge.direction, dtype=float)

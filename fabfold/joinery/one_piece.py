@@ -1,9 +1,8 @@
-"""Making one piece of what the cut left of a body: crumbs out, hollows filled, struts in."""
+"""Make one piece of what the cut left of a body: fragments out, hollows filled, struts in."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,61 +10,50 @@ from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
 from fabfold.joinery.sizes import strut_width
-from fabfold.joinery.struts import bar_solid, grid_of, plan_struts
+from fabfold.joinery.struts import grid_over, plan_struts, strut_solid
+from fabfold.joinery.tally import FRAGMENT_SHARE, BuildTally
 
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["CRUMB_SHARE", "MendTally", "one_piece"]
+__all__ = ["connect_pieces"]
 
-#: Loose pieces below this share of a full cell's volume are left out.
-CRUMB_SHARE = 0.005
+#: Rounds of adding struts before a body is given up: a strut that is trimmed may fall short.
 _STRUT_ROUNDS = 3
 
 
-@dataclass
-class MendTally:
-    """What the stages of one kit took away and added."""
-
-    carved_cells: int = 0
-    carved_mm3: float = 0.0
-    shared_cells: int = 0
-    shared_mm3: float = 0.0
-    dropped_mm3: float = 0.0
-    crumbs: int = 0
-    hollows: int = 0
-    filled_mm3: float = 0.0
-    links_cut: int = 0
-    links_mm3: float = 0.0
-    struts: int = 0
-    strutted: list[str] = field(default_factory=list)
-
-
-def one_piece(
+def connect_pieces(
     name: str,
     cells: NDArray[np.int32],
-    free: Callable[[], manifold3d.Manifold],
+    strut_space: Callable[[], manifold3d.Manifold],
     material: manifold3d.Manifold,
     halves: list[manifold3d.Manifold],
     voxel_mm: float,
-    tally: MendTally,
+    tally: BuildTally,
 ) -> manifold3d.Manifold:
-    """Material and hinge halves as one piece, with struts where it takes them.
+    """Material and hinge halves of a body as one connected solid, with struts where it needs them.
 
     Parameters
     ----------
     name : str
-        Of the body, for messages.
+        Name of the body, for messages.
     cells : (m, 3) int32 array
-        Of the body, lattice units.
-    free : callable
-        Gives the solid in which struts may run. Called only when one is needed.
+        Cells of the body, lattice units.
+    strut_space : callable
+        Gives the solid, in mm, in which struts may run. It is called only when one is needed.
     material : manifold3d.Manifold
+        What the cut left of the model in the body's cells, mm.
     halves : list of manifold3d.Manifold
-        The body's halves of its hinges.
+        The body's halves of its hinges, mm.
     voxel_mm : float
-    tally : MendTally
-        Counts crumbs, hollows and struts.
+        Side of a voxel in mm.
+    tally : BuildTally
+        Counts fragments, hollows and struts.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        One piece, in mm.
 
     Raises
     ------
@@ -76,34 +64,34 @@ def one_piece(
 
     add = manifold3d.OpType.Add
     solid = manifold3d.Manifold.batch_boolean([material, *halves], add)
-    grid = grid_of(cells, voxel_mm)
-    crumb = CRUMB_SHARE * voxel_mm**3
+    grid = grid_over(cells, voxel_mm)
+    fragment_mm3 = FRAGMENT_SHARE * voxel_mm**3
     brackets = [grid.sample(half) for half in halves]
     for _ in range(_STRUT_ROUNDS):
-        pieces = _kept_pieces(solid, halves, crumb, tally)
+        pieces = _kept_pieces(solid, halves, fragment_mm3, tally)
         if not pieces:
             raise GeometryError(
-                f"{name}: no piece of material above {crumb:.0f} mm³ and no hinge is left in its "
-                f"{len(cells)} cells"
+                f"{name}: no piece of material above {fragment_mm3:.0f} mm³ and no hinge is left "
+                f"in its {len(cells)} cells"
             )
         solid = manifold3d.Manifold.batch_boolean(pieces, add)
         samples = [grid.sample(piece) for piece in pieces]
-        bars = plan_struts(grid, lambda: grid.sample(free()), samples, brackets)
-        if bars is None:
+        struts = plan_struts(grid, lambda: grid.sample(strut_space()), samples, brackets)
+        if struts is None:
             raise GeometryError(
                 f"{name}: parts of it lie apart in its cells ({len(pieces)} pieces), and grooves "
                 "and hinges leave no way for a strut between them"
             )
-        if not bars:
+        if not struts:
             break
-        tally.struts += len(bars)
+        tally.struts += len(struts)
         if name not in tally.strutted:
             tally.strutted.append(name)
-        room = free()
+        space = strut_space()
         width = strut_width(voxel_mm)
-        solids = [bar_solid(bar, width) ^ room for bar in bars]
+        solids = [strut_solid(strut, width) ^ space for strut in struts]
         solid = manifold3d.Manifold.batch_boolean([solid, *solids], add)
-    pieces = _kept_pieces(solid, halves, crumb, tally)
+    pieces = _kept_pieces(solid, halves, fragment_mm3, tally)
     if len(pieces) != 1:
         raise GeometryError(
             f"{name}: still {len(pieces)} pieces after struts were added; "
@@ -113,12 +101,15 @@ def one_piece(
 
 
 def _kept_pieces(
-    solid: manifold3d.Manifold, halves: list[manifold3d.Manifold], crumb: float, tally: MendTally
+    solid: manifold3d.Manifold,
+    halves: list[manifold3d.Manifold],
+    fragment_mm3: float,
+    tally: BuildTally,
 ) -> list[manifold3d.Manifold]:
-    """Pieces without crumbs and with closed hollows filled, the largest first.
+    """Pieces without fragments and with closed hollows filled, the largest first.
 
     A hollow that nothing leads into would trap powder or resin; it shows as a piece of negative
-    volume, which is left out. A small piece that holds a hinge is no crumb.
+    volume, which is left out. A small piece that holds a hinge is no fragment.
     """
     pieces = sorted(solid.decompose(), key=lambda piece: -piece.volume())
     hollows = [piece for piece in pieces if piece.volume() < 0.0]
@@ -135,9 +126,9 @@ def _kept_pieces(
         return pieces
     kept = []
     for piece in pieces:
-        small = piece.volume() < crumb
+        small = piece.volume() < fragment_mm3
         if small and not any((piece ^ half).volume() > 1e-3 for half in halves):
-            tally.crumbs += 1
+            tally.fragments += 1
             tally.dropped_mm3 += piece.volume()
         else:
             kept.append(piece)

@@ -18,14 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.fold.motion import Motion
-from fabfold.joinery.grooves import SAGITTA_MM, Passage, descendants, distinct, inverse, step_deg
-from fabfold.joinery.hinge_placement import Plate
+from fabfold.joinery.barrel_sweeps import (
+    Sweep,
+    descendants,
+    distinct_sweeps,
+    resting_sweep,
+    turn_axis,
+    turning_sweep,
+)
+from fabfold.joinery.grooves import SAGITTA_MM, hull_step_deg
+from fabfold.joinery.hinge_placement import LinkPlate
 from fabfold.tree.fold_tree import FoldTree
 
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["plate_passages", "plate_tools"]
+__all__ = ["plate_sweeps", "pocket_tools"]
 
 #: How far a hull may go beyond a plate that turns in its own plane between two placements, in mm.
 _EXCESS_MM = 0.3
@@ -33,8 +41,21 @@ _EXCESS_MM = 0.3
 Floats = NDArray[np.float64]
 
 
-def grown_corners(plate: Plate, by_mm: float) -> Floats:
-    """Corners whose hull is the plate with `by_mm` more on every side, shape (k, 3), mm."""
+def grown_corners(plate: LinkPlate, by_mm: float) -> Floats:
+    """Corners of a plate that is larger on every side.
+
+    Parameters
+    ----------
+    plate : LinkPlate
+        The plate in its place in A.
+    by_mm : float
+        How much larger, mm.
+
+    Returns
+    -------
+    (k, 3) float64 array
+        Corners in mm, in a fixed order; their hull is the larger plate.
+    """
     import manifold3d
 
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
@@ -45,15 +66,15 @@ def grown_corners(plate: Plate, by_mm: float) -> Floats:
     return np.asarray(corners[order])
 
 
-def plate_passages(
+def plate_sweeps(
     tree: FoldTree,
     motion: Motion,
-    plates: dict[int, Plate],
+    plates: dict[int, LinkPlate],
     *,
     voxel_mm: float,
     clearance_mm: float,
-) -> list[Passage]:
-    """Every distinct way in which a link plate may come past another body.
+) -> list[Sweep]:
+    """Every distinct way in which a link plate may pass another body.
 
     How a plate lies beside its own parent and child in A is the hinge's business and left out. Of
     two links only the later one makes room for the other.
@@ -61,16 +82,20 @@ def plate_passages(
     Parameters
     ----------
     tree : FoldTree
+        The bodies and their hinges.
     motion : Motion
-        One hinge a move, linear between keyframes.
-    plates : dict of int to Plate
-        By index of the link.
-    voxel_mm, clearance_mm : float
+        The folding path: one hinge a move, linear between keyframes.
+    plates : dict of int to LinkPlate
+        The link plates by index of the link.
+    voxel_mm : float
+        Side of a voxel in mm.
+    clearance_mm : float
+        Gap between bodies in mm.
 
     Returns
     -------
-    list of Passage
-        In a fixed order; ``hinge`` is the index of the link, ``start`` the corners of the plate
+    list of Sweep
+        In a fixed order; ``owner`` is the index of the link, ``points`` the corners of the plate
         with the clearance around it.
     """
     carried = descendants(tree)
@@ -79,49 +104,48 @@ def plate_passages(
         for link, plate in sorted(plates.items())
     }
     centres = body_cells(tree, plates)
-    found: list[Passage] = []
-    zero = np.zeros(3)
-    poses = tree.body_poses(motion.angles_deg[0])
+    found: list[Sweep] = []
     for link, corners in shapes.items():
         for body, cells in enumerate(centres):
             if body in (link, *plates[link].bodies) or (body in plates and body < link):
                 continue
             low, high = corners.min(axis=0), corners.max(axis=0)
             if ((cells - 0.5 < high) & (low < cells + 0.5)).all(axis=1).any():
-                found.append(Passage(body, link, corners, zero, zero, 0.0))
+                found.append(resting_sweep(body, link, corners))
     for k in range(1, len(motion.angles_deg)):
         poses = tree.body_poses(motion.angles_deg[k - 1])
         for m in motion.moves[k]:
             turn = float(motion.angles_deg[k, m] - motion.angles_deg[k - 1, m])
-            world = poses[tree.hinges[m].parent]
-            point = world[:3, :3] @ np.array(tree.hinges[m].point) + world[:3, 3]
-            axis = world[:3, :3] @ np.array(tree.hinges[m].direction, dtype=float)
+            point, axis = turn_axis(tree.hinges[m], poses)
             for link, corners in shapes.items():
                 moving = bool(carried[m, link])
+                angle = turn if moving else -turn
                 placed = corners @ poses[link][:3, :3].T + poses[link][:3, 3]
                 for body in np.flatnonzero(carried[m] != moving).tolist():
                     if body in plates and body < link:
                         continue
                     pose = poses[body]
                     cells = centres[body] @ pose[:3, :3].T + pose[:3, 3]
-                    if not _may_meet(placed, cells, point, axis):
-                        continue
-                    back = inverse(pose)
-                    found.append(
-                        Passage(
-                            body,
-                            link,
-                            placed @ back[:3, :3].T + back[:3, 3],
-                            back[:3, :3] @ point + back[:3, 3],
-                            back[:3, :3] @ axis,
-                            turn if moving else -turn,
-                        )
-                    )
-    return distinct(found)
+                    if _may_meet(placed, cells, point, axis):
+                        found.append(turning_sweep(body, link, placed, point, axis, angle, pose))
+    return distinct_sweeps(found)
 
 
-def body_cells(tree: FoldTree, plates: dict[int, Plate]) -> list[Floats]:
-    """Middles of unit cubes that hold each body, barrels left out; a link has one on its face."""
+def body_cells(tree: FoldTree, plates: dict[int, LinkPlate]) -> list[Floats]:
+    """Unit cubes that hold each body, barrels left out; a link has one about its face.
+
+    Parameters
+    ----------
+    tree : FoldTree
+        The bodies and their voxels.
+    plates : dict of int to LinkPlate
+        The link plates by index of the link.
+
+    Returns
+    -------
+    list of (n, 3) float64 arrays
+        Middles of the cubes of each body, lattice units.
+    """
     return [
         plates[index].cells.mean(axis=0, keepdims=True)
         if index in plates
@@ -157,42 +181,45 @@ def _may_meet(corners: Floats, cells: Floats, point: Floats, axis: Floats) -> bo
     )
 
 
-def plate_tools(
-    found: list[Passage], low: Floats, high: Floats, *, voxel_mm: float
+def pocket_tools(
+    sweeps: list[Sweep], low: Floats, high: Floats, *, voxel_mm: float
 ) -> list[tuple[int, manifold3d.Manifold]]:
-    """Cutting solids for one body.
+    """Tools that cut the pockets of one body.
 
     Parameters
     ----------
-    found : list of Passage
-        The passages of link plates past this body.
-    low, high : (m, 3) float64 arrays
-        Boxes that hold the body's material, lattice units.
+    sweeps : list of Sweep
+        How link plates pass this body.
+    low : (m, 3) float64 array
+        Lowest corners of boxes that hold the body's material, lattice units.
+    high : (m, 3) float64 array
+        Highest corners of these boxes, lattice units.
     voxel_mm : float
+        Side of a voxel in mm.
 
     Returns
     -------
     list of (int, manifold3d.Manifold)
-        Link and convex solid in mm; solids may overlap each other.
+        Index of the link, and a convex solid in mm; solids may overlap each other.
     """
     import manifold3d
 
     tools = []
-    for passage in found:
-        if passage.angle_deg == 0.0:
-            steps = passage.start[None]
+    for sweep in sweeps:
+        if sweep.angle_deg == 0.0:
+            steps = sweep.points[None]
         else:
-            step = step_deg(passage, voxel_mm, _EXCESS_MM)
-            count = max(1, int(np.ceil(abs(passage.angle_deg) / step)))
-            places = passage.placements(np.linspace(0.0, passage.angle_deg, count + 1))
+            step = hull_step_deg(sweep, voxel_mm, _EXCESS_MM)
+            count = max(1, int(np.ceil(abs(sweep.angle_deg) / step)))
+            places = sweep.placements(np.linspace(0.0, sweep.angle_deg, count + 1))
             steps = np.concatenate([places[:-1], places[1:]], axis=1)
-        for index in np.flatnonzero(_touching(steps, low, high)):
+        for index in np.flatnonzero(_may_overlap(steps, low, high)):
             hull = manifold3d.Manifold.hull_points(steps[index] * voxel_mm)
-            tools.append((passage.hinge, hull))
+            tools.append((sweep.owner, hull))
     return tools
 
 
-def _touching(steps: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
+def _may_overlap(steps: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
     """Which hulls of points (s, k, 3) may overlap one of some boxes (m, 3): separating axes."""
     near = np.ones((len(steps), len(low)), dtype=bool)
     centre, half = (low + high) / 2, (high - low) / 2

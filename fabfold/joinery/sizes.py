@@ -19,6 +19,7 @@ __all__ = ["MIN_WALL_MM", "HingeSize", "hinge_size", "smallest_voxel", "strut_wi
 MIN_WALL_MM = 0.8
 #: Barrels thicker than this share of the voxel would eat too much of the cells around them.
 _LARGEST_BARREL = 0.18
+#: Knuckles of a single hinge where nothing else is asked for.
 _DEFAULT_KNUCKLES = 3
 
 
@@ -28,10 +29,16 @@ class HingeSize:
 
     Attributes
     ----------
-    barrel_radius_mm, pin_radius_mm, clearance_mm : float
+    barrel_radius_mm : float
+        Radius of the barrel.
+    pin_radius_mm : float
+        Radius of the pin of a single hinge.
+    clearance_mm : float
+        Normal clearance between the surfaces that turn on each other.
     knuckles : int
+        Number of knuckles of a single hinge.
     voxel_mm : float
-        Length of the edge.
+        Length of the hinged edge, the side of a voxel.
     meshes : hinges.mesh.HingeMeshes
         The four pieces of a single hinge in its own frame.
     """
@@ -58,7 +65,12 @@ class HingeSize:
         second : str
             Edge of the second axis, as in :func:`hinges.mesh.double_hinge_meshes`.
         turns : (float, float)
-            90, 180 or 270 degrees each.
+            How far each axis turns: 90, 180 or 270 degrees.
+
+        Returns
+        -------
+        hinges.mesh.DoubleHingeMeshes
+            The pieces of the hinge in its own frame, mm.
 
         Raises
         ------
@@ -92,7 +104,7 @@ class HingeSize:
 
 
 def strut_width(voxel_mm: float) -> float:
-    """Side of the square bars that join loose material, in mm: 15 % of a voxel, at least 1.6."""
+    """Side in mm of the square bars that join loose material: 15 % of a voxel, at least 1.6."""
     return max(1.6, 0.15 * voxel_mm)
 
 
@@ -111,11 +123,20 @@ def hinge_size(
     Parameters
     ----------
     voxel_mm : float
-        Length of the edge.
+        Length of the edge in mm.
     clearance_mm : float
-        Normal clearance in the hinge.
-    barrel_radius_mm, pin_radius_mm, knuckles : optional
-        Used as they are when given.
+        Normal clearance in the hinge in mm.
+    barrel_radius_mm : float, optional
+        Radius of the barrel in mm, used as it is.
+    pin_radius_mm : float, optional
+        Radius of the pin in mm, used as it is.
+    knuckles : int, optional
+        Number of knuckles; 3 by default.
+
+    Returns
+    -------
+    HingeSize
+        The first size that fits.
 
     Raises
     ------
@@ -146,6 +167,7 @@ def _first_fit(
     pin: float | None,
     knuckles: int | None,
 ) -> tuple[HingeSize | None, str]:
+    """The first size that fits, or None and the rule that the first try broke."""
     from hinges.exceptions import HingeError
     from hinges.mesh import single_hinge_meshes
 
@@ -194,6 +216,12 @@ def smallest_voxel(clearance_mm: float) -> float | None:
     Parameters
     ----------
     clearance_mm : float
+        Normal clearance in the hinge in mm.
+
+    Returns
+    -------
+    float or None
+        Side of the voxel in mm.
     """
     for side in range(4, 61):
         if _first_fit(float(side), clearance_mm, None, None, None)[0] is not None:

@@ -1,4 +1,8 @@
-"""Finishing a body: light, closed, one piece, also after rounding to the floats of an STL file."""
+"""The final mesh of a body: few triangles, closed, one piece, also in the precision of STL.
+
+An STL file holds coordinates in single precision, and its readers join corners that round to the
+same point. Such a mesh must still be a closed two-manifold.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +16,15 @@ from fabfold.errors import GeometryError
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["finish_mesh", "mesh_faults", "piece_count", "stl_mesh"]
+__all__ = ["mesh_faults", "piece_count", "printable_body", "stl_mesh"]
 
 #: Flat faces are merged and short edges collapsed up to this deviation.
 SIMPLIFY_MM = 0.001
 #: Side of the cubes that are taken out where a body touches itself in a point or along an edge.
 _NICK_MM = 0.15
+#: How often nicks are cut, each time a little larger.
 _ROUNDS = 6
+#: Corners of a cube of side 2.
 _CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
@@ -33,13 +39,16 @@ def stl_mesh(
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corners of the mesh in mm.
     faces : (f, 3) integer array
+        Triangles as indices into `vertices`.
 
     Returns
     -------
     vertices : (w, 3) float64 array
-        Every value is exactly a single-precision number.
+        Distinct corners in mm; every value is exactly a single-precision number.
     faces : (g, 3) int32 array
+        The triangles that are left, as indices into the new vertices.
     """
     rounded = np.asarray(vertices, dtype=np.float32) + np.float32(0.0)  # -0.0 becomes 0.0
     merged, index = np.unique(rounded, axis=0, return_inverse=True)
@@ -63,7 +72,9 @@ def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDAr
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corners of the mesh, no two alike.
     faces : (f, 3) int32 array
+        Triangles as indices into `vertices`.
 
     Returns
     -------
@@ -79,18 +90,18 @@ def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDAr
     end = np.roll(faces, -1, axis=1).reshape(-1).astype(np.int64)
     forward, backward = start * count + end, end * count + start
     keys, times = np.unique(forward, return_counts=True)
-    lonely = keys[(times != 1) | ~np.isin(keys, backward)]
-    if len(lonely):
-        edges = np.sort(np.stack([lonely // count, lonely % count], axis=1), axis=1)
+    unmatched = keys[(times != 1) | ~np.isin(keys, backward)]
+    if len(unmatched):
+        edges = np.sort(np.stack([unmatched // count, unmatched % count], axis=1), axis=1)
         return np.asarray(np.unique(edges, axis=0), dtype=np.int64)
     # Corners of one vertex hang together across the edges that leave it: one component a fan.
     order = np.argsort(backward)
     position = np.searchsorted(backward[order], forward)
     twin = order[position]  # half-edge that runs against half-edge i
-    nxt = np.arange(len(start)).reshape(-1, 3)[:, [1, 2, 0]].reshape(-1)
+    following = np.arange(len(start)).reshape(-1, 3)[:, [1, 2, 0]].reshape(-1)
     # Half-edge i starts at v; its twin ends at v, so the twin's successor starts at v again.
     links = coo_matrix(
-        (np.ones(len(start), dtype=np.int8), (np.arange(len(start)), nxt[twin])),
+        (np.ones(len(start), dtype=np.int8), (np.arange(len(start)), following[twin])),
         shape=(len(start), len(start)),
     )
     _, fan = connected_components(links, directed=False)
@@ -101,7 +112,20 @@ def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDAr
 
 
 def piece_count(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> int:
-    """Number of edge-connected pieces of a mesh."""
+    """Number of pieces of a mesh that are connected along edges.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+        Corners of the mesh; each is used.
+    faces : (f, 3) int32 array
+        Triangles as indices into `vertices`.
+
+    Returns
+    -------
+    int
+        At least 1 for a mesh that is not empty.
+    """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -112,29 +136,30 @@ def piece_count(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> int:
     return int(connected_components(graph, directed=False)[0])
 
 
-def finish_mesh(
+def printable_body(
     solid: manifold3d.Manifold, name: str, origin_mm: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Final triangles of one body.
+    """Final mesh of one body in shape A.
 
-    Flat faces are merged, the body is moved to its place, and the mesh is made sound as an STL
-    reader will see it: where the body touches itself in a point or along an edge, a nick of a
-    tenth of a millimetre parts the two sides.
+    Flat faces are merged, the body is moved to its place, and the mesh is made a closed
+    two-manifold as an STL reader will see it: where the body touches itself in a point or along an
+    edge, a nick of a tenth of a millimetre parts the two sides.
 
     Parameters
     ----------
     solid : manifold3d.Manifold
-        One piece, in mm.
+        One piece, in mm, lattice origin at zero.
     name : str
         Name of the body, for the error message.
     origin_mm : (3,) float64 array
-        Added to every point.
+        Where the lattice origin lies in shape A, mm; it is added to every point.
 
     Returns
     -------
     vertices : (v, 3) float64 array
-        Every value is exactly a single-precision number.
+        Corners in mm, shape A; every value is exactly a single-precision number.
     faces : (f, 3) int32 array
+        Triangles as indices into `vertices`, counter-clockwise seen from outside.
 
     Raises
     ------

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fabfold.kit.stages import Made
-from fabfold.printing.checks import Check, check_bodies
+from fabfold.printing.body_checks import check_bodies
+from fabfold.printing.checks import Check
 from fabfold.printing.profiles import Profile
 from fabfold.progress import Progress
 from fabfold.proof.replay import replay

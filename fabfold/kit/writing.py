@@ -9,7 +9,8 @@ from typing import Any
 from fabfold.export.colours import body_colours
 from fabfold.export.flat import flat_poses
 from fabfold.export.glb import write_glb
-from fabfold.export.picture import png_bytes, write_strip
+from fabfold.export.kit_picture import write_strip
+from fabfold.export.render import png_bytes
 from fabfold.export.report import write_report
 from fabfold.export.sketch import picture_of_tree
 from fabfold.export.step import write_step

@@ -23,13 +23,18 @@ def calibrate(
     profile : Profile
         The shipped profile that the coupon was made with.
     turns_freely_mm : float
-        Smallest clearance on the coupon whose hinge turns freely: the new clearance.
+        Smallest clearance on the coupon whose hinge turns freely, mm: the new clearance.
     fuses_mm : float, optional
-        Largest clearance on the coupon whose hinge came out fused. The smallest gap that counts as
-        open lies half-way between the two; without it, the profile's own share of the clearance
-        is kept.
+        Largest clearance on the coupon whose hinge came out fused, mm. The smallest gap that
+        counts as open lies half-way between the two; without it, the profile's own share of the
+        clearance is kept.
     name : str, optional
-        Of the new profile.
+        Name of the new profile; ``my-`` and the name of the shipped one by default.
+
+    Returns
+    -------
+    Profile
+        The new profile; its first source says what was read off the coupon.
 
     Raises
     ------
@@ -63,7 +68,15 @@ def calibrate(
 
 
 def write_profile(path: Path, profile: Profile) -> None:
-    """Write a profile as TOML that :func:`~fabfold.printing.profiles.load_profile` reads."""
+    """Write a profile as TOML that :func:`~fabfold.printing.profiles.load_profile` reads.
+
+    Parameters
+    ----------
+    path : Path
+        File to write, ending in ``.toml``.
+    profile : Profile
+        The profile; fields that are None are left out.
+    """
     document = tomlkit.document()
     for key, value in profile.model_dump(exclude_none=True).items():
         item = tomlkit.item(list(value) if isinstance(value, tuple) else value)

@@ -18,11 +18,16 @@ def make_coupon(
     Parameters
     ----------
     path : Path
-        Ends in ``.3mf``, ``.step`` or ``.stl``.
+        File to write, ending in ``.3mf``, ``.step`` or ``.stl``.
     profile : str, optional
-        Name or file of a printer profile.
+        Name or file of a printer profile; the default profile if left out.
     clearances : str, optional
-        Numbers with commas between, in mm.
+        Clearances of the coupon's hinges in mm, with commas between.
+
+    Returns
+    -------
+    list of Path
+        The files that were written.
 
     Raises
     ------

@@ -18,6 +18,7 @@ __all__ = ["DEFAULT_PROFILE", "Profile", "load_profile", "profile_names", "profi
 #: processes, every printing service offers it, and nylon bears folding.
 DEFAULT_PROFILE = "mjf-pa12"
 
+#: A length of a profile in mm.
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
 
 
@@ -26,26 +27,33 @@ class Profile(BaseModel):
 
     Attributes
     ----------
-    name, description : str
-    process, material : str
-        Such as ``"FDM"`` and ``"PLA"``.
+    name : str
+        Name by which the profile is asked for.
+    description : str
+        What the profile is for, in one sentence.
+    process : str
+        Printing process, such as ``"FDM"``.
+    material : str
+        Printing material, such as ``"PLA"``.
     nozzle_mm : float or None
-        Of extruding printers.
+        Width of the nozzle of an extruding printer, mm.
     layer_mm : float or None
+        Height of a layer, mm.
     clearance_mm : float
-        Gap between bodies and in hinges that a kit is made with unless its recipe says otherwise.
+        Gap between bodies and in hinges that a kit is made with unless its recipe says otherwise,
+        mm.
     min_gap_mm : float
-        Smallest gap that stays open in the print.
+        Smallest gap that stays open in the print, mm.
     min_wall_mm : float
-        Thinnest wall that prints.
+        Thinnest wall that prints, mm.
     max_overhang_deg : float or None
-        Steepest overhang from the vertical that prints without support; None where no support is
-        needed.
+        Steepest overhang that prints without support, degrees from the vertical; None where no
+        support is needed.
     in_place : bool
         Whether the closed kit can be printed as one object: the process leaves open the gap under
         every face.
-    bed_mm : tuple of three floats or None
-        Build volume along x, y and z.
+    bed_mm : (float, float, float) or None
+        Build volume along x, y and z, mm.
     sources : tuple of str
         Where the figures come from.
     """
@@ -93,6 +101,11 @@ def load_profile(name: str) -> Profile:
     ----------
     name : str
         Such as ``"mjf-pa12"`` or ``"my-printer.toml"``.
+
+    Returns
+    -------
+    Profile
+        The limits that the file gives.
 
     Raises
     ------

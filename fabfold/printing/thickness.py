@@ -1,4 +1,4 @@
-"""Wall thickness of a closed mesh by rays through the material."""
+"""Surface of a mesh: its area, points spread over it, and the thickness of the wall below them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.joinery.bodies import BodyMesh
+
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["Thickness", "ray_thickness", "surface_samples"]
+__all__ = ["Thickness", "ray_thickness", "surface_area", "surface_samples"]
 
 
 class Thickness(NamedTuple):
@@ -19,7 +21,7 @@ class Thickness(NamedTuple):
     Attributes
     ----------
     points : (k, 3) float64 array
-        In mm.
+        Points of the surface in mm.
     values : (k,) float64 array
         Distance through the material to the surface on the other side, mm.
     """
@@ -28,8 +30,15 @@ class Thickness(NamedTuple):
     values: NDArray[np.float64]
 
     def share_below(self, limit_mm: float) -> float:
-        """Share of the surface that is thinner than a limit."""
+        """Share of the surface that is thinner than a limit in mm, 0 to 1."""
         return float((self.values < limit_mm).mean()) if len(self.values) else 0.0
+
+
+def surface_area(body: BodyMesh) -> float:
+    """Area of a body's surface in mm²."""
+    corners = body.vertices[body.faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return float(np.linalg.norm(across, axis=1).sum() / 2)
 
 
 def surface_samples(
@@ -43,14 +52,18 @@ def surface_samples(
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corners of the mesh in mm.
     faces : (f, 3) int32 array
+        Triangles as indices into `vertices`, counter-clockwise seen from outside.
     count : int
+        Number of points.
 
     Returns
     -------
     points : (count, 3) float64 array
+        Points of the surface in mm.
     normals : (count, 3) float64 array
-        Unit normals, outwards.
+        Unit normals there, outwards.
     """
     corners = vertices[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -83,18 +96,20 @@ def ray_thickness(
     Parameters
     ----------
     solid : manifold3d.Manifold
-        The same mesh.
+        The mesh as a solid, mm.
     vertices : (v, 3) float64 array
-        In mm.
+        Corners of the mesh in mm.
     faces : (f, 3) int32 array
+        Triangles as indices into `vertices`, counter-clockwise seen from outside.
     count : int
         Number of points.
     reach_mm : float
-        Rays end here; thicker places have this value.
+        Length of the rays in mm; thicker places have this value.
 
     Returns
     -------
     Thickness
+        The points and the thickness at each.
     """
     points, normals = surface_samples(vertices, faces, count)
     # Start a little below the surface, so that the ray does not hit the face it starts from.

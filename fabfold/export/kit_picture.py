@@ -1,4 +1,4 @@
-"""Pictures of models and of kits in any state of their motion."""
+"""Pictures of a kit in any state of its motion."""
 
 from __future__ import annotations
 
@@ -8,49 +8,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.export.camera import View, camera_for, project
 from fabfold.export.colours import body_colours
-from fabfold.export.render import Image, View, camera_for, png_bytes, project, render
+from fabfold.export.render import Image, png_bytes, render
 from fabfold.files import write_bytes
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
 from fabfold.lattice.rotations import ROTATIONS
-from fabfold.solid.closed_solid import Solid
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = [
-    "View",
-    "halfway",
-    "picture_of_kit",
-    "picture_of_solid",
-    "png_bytes",
-    "render",
-    "strip",
-    "write_strip",
-]
-
-_MODEL_COLOUR = (0x8F, 0xA9, 0xC4)
-
-
-def picture_of_solid(
-    solid: Solid,
-    view: View | None = None,
-    *,
-    colour: tuple[int, int, int] = _MODEL_COLOUR,
-) -> Image:
-    """Draw a model as it came in.
-
-    Parameters
-    ----------
-    solid : Solid
-    view : View, optional
-    colour : (int, int, int)
-        sRGB.
-
-    Returns
-    -------
-    (height, width, 3) uint8 array
-    """
-    return render([(solid.vertices, solid.faces)], np.array([colour], dtype=np.uint8), None, view)
+__all__ = ["halfway", "picture_of_kit", "strip", "write_strip"]
 
 
 def _poses_mm(
@@ -59,6 +26,7 @@ def _poses_mm(
     angles_deg: NDArray[np.float64],
     upright: NDArray[np.float64] | None,
 ) -> NDArray[np.float64]:
+    """Poses (b, 4, 4) of the bodies in mm, turned by the rotation `upright` if there is one."""
     to_mm = np.eye(4)
     to_mm[:3, :3] *= joinery.voxel_mm
     to_mm[:3, 3] = joinery.origin_mm
@@ -85,21 +53,26 @@ def picture_of_kit(
     Parameters
     ----------
     joinery : Joinery
+        The printed bodies in shape A.
     tree : FoldTree
+        The bodies and hinges, in the same order.
     angles_deg : (h,) float64 array, optional
-        Angle of every hinge; shape A by default.
+        Angle of every hinge in degrees; shape A by default.
     view : View, optional
+        Direction, size and light of the picture.
     colours : (b, 3) uint8 array, optional
-        sRGB, one a body; by default :func:`~fabfold.export.colours.body_colours`.
+        Colour of each body, sRGB; by default :func:`~fabfold.export.colours.body_colours`.
     upright : (3, 3) float64 array, optional
         Rotation from shape A's axes to the picture's, whose z is up: ``voxels.rotation.T`` shows
         the model as it came in.
     distance : float, optional
-        See :func:`render`, mm.
+        Distance of the camera from the middle of the kit in mm, see
+        :func:`~fabfold.export.render.render`.
 
     Returns
     -------
     (height, width, 3) uint8 array
+        The picture, sRGB.
     """
     angles = np.zeros(len(tree.hinges)) if angles_deg is None else angles_deg
     return render(
@@ -112,7 +85,18 @@ def picture_of_kit(
 
 
 def halfway(motion: Motion) -> NDArray[np.float64]:
-    """Angles when half of all turning is done, shape (h,)."""
+    """Angles of the hinges when half of all turning is done.
+
+    Parameters
+    ----------
+    motion : Motion
+        The folding path.
+
+    Returns
+    -------
+    (h,) float64 array
+        Angle of every hinge in degrees.
+    """
     turns = np.abs(np.diff(motion.angles_deg, axis=0)).sum(axis=1)
     done = np.concatenate([[0.0], np.cumsum(turns)])
     if done[-1] <= 0.0:
@@ -162,20 +146,26 @@ def strip(
     Parameters
     ----------
     joinery : Joinery
+        The printed bodies in shape A.
     tree : FoldTree
+        The bodies and hinges, in the same order.
     motion : Motion
+        The folding path.
     view : View, optional
-        The height of its size is the strip's; each part is as wide as it needs.
+        Direction, size and light; the height of its size is the strip's, and each part is as wide
+        as it needs.
     colours : (b, 3) uint8 array, optional
+        Colour of each body, sRGB.
     upright : (3, 3) float64 array, optional
-        See :func:`picture_of_kit`. After A the nearest rotation along the lattice is taken, so
-        that the box stands straight.
+        Rotation from shape A's axes to the picture's, see :func:`picture_of_kit`. After A the
+        nearest rotation of the lattice is taken, so that the box stands straight.
     between : bool
-        Show the kit half-way too.
+        Whether the kit half-way is shown too.
 
     Returns
     -------
     (height, width, 3) uint8 array
+        The picture, sRGB.
     """
     view = view or View(size=(560, 560))
     stand = None if upright is None else _nearest_lattice(upright)
@@ -215,6 +205,24 @@ def write_strip(
     colours: NDArray[np.uint8] | None = None,
     upright: NDArray[np.float64] | None = None,
 ) -> None:
-    """Write :func:`strip` as a PNG file."""
+    """Write shape A, the kit half-way, and shape B side by side as a PNG file.
+
+    Parameters
+    ----------
+    path : Path
+        File to write, ending in ``.png``.
+    joinery : Joinery
+        The printed bodies in shape A.
+    tree : FoldTree
+        The bodies and hinges, in the same order.
+    motion : Motion
+        The folding path.
+    view : View, optional
+        Direction, size and light, see :func:`strip`.
+    colours : (b, 3) uint8 array, optional
+        Colour of each body, sRGB.
+    upright : (3, 3) float64 array, optional
+        Rotation from shape A's axes to the picture's, see :func:`strip`.
+    """
     image = strip(joinery, tree, motion, view, colours=colours, upright=upright)
     write_bytes(path, png_bytes(image))

@@ -1,0 +1,68 @@
+"""All checks of the printed bodies against the limits of a printer and material.
+
+What each figure can and cannot say is in ``docs/check.md``.
+"""
+
+from __future__ import annotations
+
+from fabfold.errors import GeometryError
+from fabfold.fold.motion import Motion
+from fabfold.joinery.bodies import Joinery
+from fabfold.joinery.cells import as_manifold
+from fabfold.printing.checks import Check
+from fabfold.printing.gap_checks import check_gaps
+from fabfold.printing.overhang_checks import check_overhang
+from fabfold.printing.profiles import Profile
+from fabfold.printing.size_checks import check_sizes
+from fabfold.printing.topology_checks import check_topology
+from fabfold.printing.wall_checks import check_walls
+from fabfold.progress import Progress, SilentProgress
+from fabfold.tree.fold_tree import FoldTree
+
+__all__ = ["check_bodies"]
+
+
+def check_bodies(
+    joinery: Joinery,
+    tree: FoldTree,
+    motion: Motion,
+    profile: Profile,
+    progress: Progress | None = None,
+) -> list[Check]:
+    """Check all bodies of a kit for printing.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The printed bodies in shape A.
+    tree : FoldTree
+        The bodies and hinges; it names the hinged pairs.
+    motion : Motion
+        The folding path; its number of moves is reported.
+    profile : Profile
+        Limits of the printer and material.
+    progress : Progress, optional
+        Is told how far the checks are.
+
+    Returns
+    -------
+    list of Check
+        Each with its figure, limit and verdict, in the order of the report.
+    """
+    told = progress or SilentProgress()
+    told.update(0.0, "reading the bodies")
+    checks = check_topology(joinery, told)
+    try:
+        solids = [as_manifold(body.vertices, body.faces, body.name) for body in joinery.bodies]
+    except GeometryError as error:
+        # Nothing below can be measured on a mesh that is no solid.
+        return [*checks, Check("bodies are solids", 1.0, 0.0, "bodies", False, str(error))]
+    told.update(0.4, "gaps between bodies")
+    checks += check_gaps(joinery, tree, solids, profile)
+    told.update(0.6, "walls")
+    checks += check_walls(joinery, solids, profile)
+    told.update(0.9, "sizes and overhangs")
+    checks += check_sizes(joinery, tree, motion, profile)
+    checks.append(check_overhang(joinery, profile))
+    told.update(1.0, f"{len(checks)} checks")
+    return checks

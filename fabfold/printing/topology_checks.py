@@ -1,0 +1,82 @@
+"""Check of the meshes' topology by MeshLab."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fabfold.joinery.bodies import Joinery
+from fabfold.printing.checks import Check
+from fabfold.progress import Progress
+
+__all__ = ["check_topology"]
+
+
+def check_topology(joinery: Joinery, progress: Progress) -> list[Check]:
+    """Check that every mesh is closed, two-manifold, one piece and free of self-intersections.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The printed bodies.
+    progress : Progress
+        Is told which body is looked at.
+
+    Returns
+    -------
+    list of Check
+        Four checks over all bodies, as MeshLab sees them.
+    """
+    import pymeshlab
+
+    names = [body.name for body in joinery.bodies]
+    opened, branching, pieces, crossing = [], [], [], []
+    for index, body in enumerate(joinery.bodies):
+        progress.update(0.4 * index / len(names), f"mesh of {body.name}")
+        meshes = pymeshlab.MeshSet(verbose=False)
+        meshes.add_mesh(
+            pymeshlab.Mesh(
+                np.ascontiguousarray(body.vertices, dtype=np.float64),
+                np.ascontiguousarray(body.faces, dtype=np.int32),
+            )
+        )
+        measures = meshes.get_topological_measures()
+        opened.append(int(measures["boundary_edges"]))
+        branching.append(
+            int(measures["non_two_manifold_edges"]) + int(measures["non_two_manifold_vertices"])
+        )
+        pieces.append(int(measures["connected_components_number"]) - 1)
+        meshes.compute_selection_by_self_intersections_per_face()
+        crossing.append(int(meshes.current_mesh().selected_face_number()))
+    count = len(names)
+
+    def check(name: str, values: list[int], unit: str, fine: str) -> Check:
+        bad = _worst(names, values)
+        return Check(name, float(sum(values)), 0.0, unit, not bad, bad or fine)
+
+    return [
+        check("closed surfaces", opened, "open edges", f"all {count} meshes are watertight"),
+        check(
+            "two-manifold surfaces",
+            branching,
+            "edges and corners",
+            "no edge or corner where more than two sheets meet",
+        ),
+        check(
+            "one piece a body",
+            pieces,
+            "loose pieces",
+            f"{count} bodies, {count} pieces: nothing falls out of the printer",
+        ),
+        check(
+            "surfaces that cross themselves",
+            crossing,
+            "triangles",
+            "slicers and CAD read every body as a plain solid",
+        ),
+    ]
+
+
+def _worst(names: list[str], values: list[int]) -> str:
+    """Names of the bodies with a value above zero."""
+    bad = [f"{name} ({value})" for name, value in zip(names, values, strict=True) if value]
+    return ", ".join(bad[:5]) + (f" and {len(bad) - 5} more" if len(bad) > 5 else "")
