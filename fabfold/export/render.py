@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import RecipeError
 from fabfold.export.shading import corner_normals
+from fabfold.srgb import bytes_of_light, linear_light
 
 __all__ = ["Camera", "Image", "Mesh", "View", "camera_for", "png_bytes", "project", "render"]
 
@@ -93,17 +94,6 @@ class Camera:
     frame: NDArray[np.float64]
     focal: float
     centre: tuple[float, float]
-
-
-def _linear(colour: NDArray[np.generic] | Sequence[int]) -> NDArray[np.float64]:
-    unit = np.asarray(colour, dtype=float) / 255.0
-    return np.asarray(np.where(unit <= 0.04045, unit / 12.92, ((unit + 0.055) / 1.055) ** 2.4))
-
-
-def _srgb(light: NDArray[np.floating]) -> Image:
-    unit = np.clip(light, 0.0, 1.0)
-    curved = np.where(unit <= 0.0031308, unit * 12.92, 1.055 * unit ** (1 / 2.4) - 0.055)
-    return np.asarray(np.rint(curved * 255.0), dtype=np.uint8)
 
 
 def _frame(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
@@ -330,18 +320,18 @@ def render(
         view,
     )
     image = np.empty((*triangle.shape, 3), dtype=np.float32)
-    image[:] = _linear(view.background)
+    image[:] = linear_light(view.background)
     onto = int(covered.sum())
     left = floor.left(light[onto:])
     image *= np.repeat(np.repeat(left, samples, axis=0), samples, axis=1)[..., None]
-    paint = _linear(colours)[owner]
+    paint = linear_light(colours)[owner]
     image[covered] = _painted(
         paint[triangle[covered]], light[:onto], points[covered], facing[covered], camera, view
     )
     lines = _lines(triangle, near, facing * covered[..., None], owner)
     image *= (1.0 - view.edges * lines)[..., None]
     height, width = view.size[1], view.size[0]
-    return _srgb(image.reshape(height, samples, width, samples, 3).mean(axis=(1, 3)))
+    return bytes_of_light(image.reshape(height, samples, width, samples, 3).mean(axis=(1, 3)))
 
 
 def _gathered(

@@ -15,6 +15,7 @@ from fabfold.errors import GeometryError
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.joinery.cells import as_manifold
+from fabfold.meshes import face_areas, face_normals
 from fabfold.printing.profiles import Profile
 from fabfold.printing.thickness import ray_thickness
 from fabfold.progress import Progress, SilentProgress
@@ -292,9 +293,7 @@ def _walls(joinery: Joinery, solids: list[_Solid], profile: Profile) -> list[Che
 
 
 def _area(body: BodyMesh) -> float:
-    corners = body.vertices[body.faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return float(np.linalg.norm(across, axis=1).sum() / 2)
+    return float(face_areas(body.vertices[body.faces]).sum())
 
 
 def _sizes(joinery: Joinery, tree: FoldTree, motion: Motion, profile: Profile) -> list[Check]:
@@ -395,9 +394,7 @@ def _overhang(joinery: Joinery, profile: Profile) -> Check:
 def _overhang_areas(body: BodyMesh, steepest_deg: float) -> Floats:
     """Area of the faces that hang over, by print direction +x, -x, +y, -y, +z, -z, mm²."""
     corners = body.vertices[body.faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    area = np.linalg.norm(across, axis=1)
-    unit = across / np.maximum(area, 1e-300)[:, None]
+    unit, area = face_normals(corners)
     hang = np.sin(np.radians(steepest_deg))
     found = []
     for axis in range(3):
