@@ -56,7 +56,7 @@ def surface_samples(
     """
     corners = vertices[faces]
     normals, areas = face_normals(corners)
-    reach = np.cumsum(2 * areas)
+    reach = np.cumsum(areas)
     random = np.random.default_rng(0)
     targets = (np.arange(count) + random.random(count)) / count * reach[-1]
     chosen = np.minimum(np.searchsorted(reach, targets), len(faces) - 1)
