@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from fabfold.errors import ModelError
+from fabfold.meshes import is_closed
 from fabfold.solid.closed_solid import Solid
+from fabfold.solid.convert import to_manifold
 from fabfold.solid.load import load_solid, solid_from_mesh
 from fabfold.solid.raw import RawMesh
 
@@ -71,12 +73,12 @@ def is_sound(result: Solid) -> bool:
     """Closed, outward, and accepted by Manifold without a change."""
     import manifold3d
 
-    manifold = result.to_manifold()
+    manifold = to_manifold(result.vertices, result.faces)
     return (
         manifold.status() == manifold3d.Error.NoError
         and manifold.num_tri() == len(result.faces)
         and manifold.volume() > 0
-        and result.to_trimesh().is_watertight
+        and is_closed(result.faces)
         and len(manifold.decompose()) == 1
     )
 
@@ -512,12 +514,14 @@ def test_precision_lost_far_from_the_origin(tmp_path: Path) -> None:
         ("index.off", b"OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n", "line 5"),
         ("head.off", b"OOPS\n", "starts with OFF"),
         ("count.off", b"OFF\nmany\n", "line 2"),
+        ("power.off", "OFF\n3² 1 0\n".encode(), "line 2"),
         ("points.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
          b"property float y\nproperty float z\nend_header\n0 0 0\n", "no triangles"),
         ("early.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n"
          b"property float x\nproperty float y\nproperty float z\nelement face 4\n"
          b"property list uchar int vertex_indices\nend_header\n\x00\x00", "ends early"),
         ("odd.ply", b"ply\nhello\n", "line 2"),
+        ("property.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty\n", "line 4"),
         ("endless.ply", b"ply\nformat ascii 1.0\n", "PLY header"),
         ("text.ply", b"once upon a time", "plain text"),
         ("text.glb", b"once upon a time", "plain text"),

@@ -24,6 +24,16 @@ _PLY_BYTES = {
 def read_ply(path: Path) -> RawMesh:
     """Read a PLY file, ASCII or binary.
 
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        With the colours of faces or vertices, where the file has them.
+
     Raises
     ------
     ModelError
@@ -67,7 +77,7 @@ def _check_ply(path: Path) -> tuple[dict[str, int], bool]:
             elif words[:1] == ["element"] and len(words) == 3 and words[2].isdigit():
                 element = words[1]
                 counts[element], widths[element] = int(words[2]), 0
-            elif words[:1] == ["property"] and element:
+            elif words[:1] == ["property"] and element and len(words) > 2:
                 # A list takes at least its own count.
                 kind = words[2] if len(words) > 4 and words[1] == "list" else words[1]
                 widths[element] += _PLY_BYTES.get(kind, 1)
@@ -91,6 +101,16 @@ def _check_ply(path: Path) -> tuple[dict[str, int], bool]:
 
 def read_glb(path: Path) -> RawMesh:
     """Read every mesh of a binary glTF scene, placed by its node, turned from y up to z up.
+
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        All meshes in one, with their colours; z points up.
 
     Raises
     ------
@@ -137,6 +157,16 @@ def _load_with_trimesh(path: Path, kind: str) -> Any:
 
 def read_3mf(path: Path) -> RawMesh:
     """Read the build items of a 3MF file, each mesh placed by its transforms.
+
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        All meshes in one; with colours if each mesh has them.
 
     Raises
     ------

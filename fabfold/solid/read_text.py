@@ -22,6 +22,16 @@ def read_obj(path: Path) -> RawMesh:
 
     Colours are read where every vertex line has them, ``v x y z red green blue`` from 0 to 1.
 
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        Polygons are cut into triangles; the vertices are those of the file.
+
     Raises
     ------
     ModelError
@@ -93,6 +103,16 @@ def _check_range(path: Path, polygons: Sequence[Sequence[int]], count: int) -> N
 def read_off(path: Path) -> RawMesh:
     """Read an ASCII OFF file (also COFF, NOFF and so on: only the positions are used).
 
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        Polygons are cut into triangles; the vertices are those of the file.
+
     Raises
     ------
     ModelError
@@ -109,7 +129,7 @@ def read_off(path: Path) -> RawMesh:
     if not words:
         number, line = next(lines, (number, ""))
         words = line.split()
-    counts = [int(word) for word in words[:2] if word.isdigit()]
+    counts = [int(word) for word in words[:2] if word.isdecimal()]
     if len(counts) != 2:
         raise ModelError(
             f"{path.name}, line {number}: expected the numbers of vertices and faces; {_AGAIN}"
