@@ -75,7 +75,7 @@ def test_grown_poses_hang_together(grown):
         assert count_defects(problem.tables, pose) == 0
 
 
-def test_apart_counts_missing_voxels_and_pieces(grown):
+def test_defects_are_unplaced_voxels_and_surplus_pieces(grown):
     problem, poses = grown
     pose = poses[0].copy()
     rng = np.random.default_rng(0)
@@ -131,7 +131,7 @@ def test_cost_is_the_weighted_depth_of_the_faces_that_show():
                 assert problem.tables.cost[v, 24 * cell + r] == pytest.approx(wanted, abs=1e-6)
 
 
-def test_bias_is_added_and_stiff_pairs_stay_whole():
+def test_extra_cost_is_added_and_some_pairs_stay_rigid():
     cells = strip(8)
     pairs = face_pairs(cells)
     template = load_template("box-2x2x2")
@@ -238,6 +238,8 @@ def test_hinges_offered_are_possible_and_complete(grown):
         assert {(int(a), int(b)) for a, b in choice.rows[["u", "v"]]} == wanted
 
 
+# Grown poses of the larger cases leave clusters that no hinge joins.
+@pytest.mark.parametrize("grown", CASES[:1], indirect=True)
 def test_spanning_trees_span_without_sharing_an_edge(grown):
     problem, poses = grown
     state = generator(3)
@@ -256,10 +258,10 @@ def test_spanning_trees_span_without_sharing_an_edge(grown):
             assert len(set(map(tuple, tree.system.point2.tolist()))) == len(tree.joints)
             sizes = np.bincount(tree.system.body)
             assert sizes[0] == sizes.max()
-    assert spanned or len(poses[0]) > 40
+    assert spanned > 5
 
 
-def test_proposals_keep_what_they_promise(grown):
+def test_recreated_poses_stay_below_the_threshold(grown):
     problem, poses = grown
     out = np.empty(len(problem), np.int32)
     state = generator(11)
