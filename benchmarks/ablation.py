@@ -62,18 +62,18 @@ class Unclosed(Judge):
 class Unguided(Judge):
     """Plans every tree from nothing."""
 
-    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
-        return self.judge.outlook(system, expansions)
+    def estimate(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        return self.judge.estimate(system, expansions)
 
 
 class Unplanned(Judge):
     """Takes for folding whatever passes the closure test, until a path is asked for."""
 
-    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
-        from fabfold.tree.foldability import Outlook
+    def estimate(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        from fabfold.tree.foldability import PlannerEstimate
 
         hinges = len(system.parent)
-        return Outlook(np.zeros(hinges, dtype=np.int32), np.zeros((0, 5), dtype=np.int32))
+        return PlannerEstimate(np.zeros(hinges, dtype=np.int32), np.zeros((0, 5), dtype=np.int32))
 
     def path(self, system: Any, guide: Any = None) -> Any:
         return self.judge.path(system)
@@ -90,13 +90,13 @@ def changed(variant: str, job: Any, voxels: Any) -> Any:
 
     effort, judge = job.effort, job.foldability
     if variant == "no improvement":
-        effort = replace(effort, closing=0, looking=0, trying=0, polishing=0)
+        effort = replace(effort, closure_tests=0, planner_runs=0, polish_each=0, polish_best=0)
     elif variant == "no polish":
-        effort = replace(effort, trying=0, polishing=0)
+        effort = replace(effort, polish_each=0, polish_best=0)
     elif variant == "no gathering":
-        effort = replace(effort, gathering=1)
+        effort = replace(effort, starts=1)
     elif variant == "one tree":
-        effort = replace(effort, trees=1)
+        effort = replace(effort, spanning_trees=1)
     elif variant == "no closure":
         judge = Unclosed(judge)
     elif variant == "no guide":
@@ -178,7 +178,8 @@ def breadth_first(neighbour: Any, root: int) -> list[int]:
 
 def grown_in_order(problem: Any, start: Any, order: list[int], beam: int, state: Any) -> Any:
     """Beam growth in a fixed order, one voxel at a time; the fullest state where all die."""
-    from fabfold.tree.grow import energy_of, fill_beam
+    from fabfold.tree.beam import fill_beam
+    from fabfold.tree.pose_energy import energy_of
 
     states = [start]
     out = np.empty((beam, len(start)), np.int32)
@@ -200,9 +201,9 @@ def grown_in_order(problem: Any, start: Any, order: list[int], beam: int, state:
 def run_growth(model: runs.Model, folder: Path, variant: str, seed: int, joints: str) -> Any:
     """Grow from the same root poses, one way or the other."""
     from fabfold.lattice.rotations import parity
-    from fabfold.tree.grow import fill_beam
+    from fabfold.tree.beam import fill_beam
+    from fabfold.tree.large_neighbourhood import repair
     from fabfold.tree.rng import generator
-    from fabfold.tree.ruin import repair
 
     kit = runs.voxelized(model, folder)
     recipe = runs.recipe_of(kit, seed, joints)
@@ -215,7 +216,7 @@ def run_growth(model: runs.Model, folder: Path, variant: str, seed: int, joints:
     colour, colourings = parity(problem.source), problem.colourings()
     cells = [np.flatnonzero(parity(problem.template.cells) == c) for c in (0, 1)]
     count = len(problem)
-    out = np.empty((effort.beam, count), np.int32)
+    out = np.empty((effort.beam_width, count), np.int32)
     left_over, full = [], 0
     spent = 0.0
     roots = 20
@@ -227,10 +228,10 @@ def run_growth(model: runs.Model, folder: Path, variant: str, seed: int, joints:
         began = time.process_time()
         if variant.startswith("breadth"):
             order = breadth_first(tables.neighbour, root)
-            pose = grown_in_order(problem, pose, order, effort.beam, state)
+            pose = grown_in_order(problem, pose, order, effort.beam_width, state)
         else:
             todo = np.flatnonzero(pose < 0).astype(np.int32)
-            fill_beam(tables, pose, todo, effort.beam, 0.3, 0.5, True, state, out)
+            fill_beam(tables, pose, todo, effort.beam_width, 0.3, 0.5, True, state, out)
             pose = out[0].copy()
         before = int((pose < 0).sum())
         done = before == 0

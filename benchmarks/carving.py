@@ -37,9 +37,9 @@ class Recorder:
     def stuck_hinges(self, system: Any) -> Any:
         return self.judge.stuck_hinges(system)
 
-    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
-        found = self.judge.outlook(system, expansions, guide)
-        if found.left.any():
+    def estimate(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        found = self.judge.estimate(system, expansions, guide)
+        if found.unresolved.any():
             self.seen += 1
             if self.seen % 20 == 1 and len(self.missed) < self.wanted:
                 self.missed.append(system)
@@ -70,7 +70,7 @@ def near_misses(voxels: Any, template: str, count: int) -> list[Any]:
                 problem,
                 seed,
                 judge,
-                Effort(restarts=3, gathering=1, trying=0, polishing=0),
+                Effort(restarts=3, starts=1, polish_each=0, polish_best=0),
                 stop=lambda: len(judge.missed) >= count,
             )
         if len(judge.missed) >= count:

@@ -94,9 +94,9 @@ class Watched(Judge):
             say(**self.notes)
         return stuck
 
-    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
-        found = super().outlook(system, expansions, guide)
-        share = (int(found.left.sum()), int(np.abs(system.turns).sum()))
+    def estimate(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        found = super().estimate(system, expansions, guide)
+        share = (int(found.unresolved.sum()), int(np.abs(system.turns).sum()))
         before = self.notes.get("left")
         if before is None or share[0] * before[1] < before[0] * share[1]:
             self.notes["left"] = share
@@ -113,7 +113,7 @@ def do_tree(
     from fabfold.search.seeds import Job, run_seed
     from fabfold.search.warmup import warm_up_job
     from fabfold.store import StageStore
-    from fabfold.tree.starts import grow
+    from fabfold.tree.initial_poses import grow
 
     kit = Kit.from_model(model, template=name_of(side), seed=seed)
     options = load_options(StageStore(folder / str(side)), files)

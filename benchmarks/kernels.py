@@ -48,9 +48,9 @@ def digest(*values: Any) -> str:
 
 
 def do_grow(seed: int) -> str:
-    from fabfold.tree.starts import grow
+    from fabfold.tree.initial_poses import grow
 
-    return digest(*grow(car_problem(), seed, roots=2))
+    return digest(*grow(car_problem(), seed, root_poses=2))
 
 
 def do_solve(seed: int) -> str:
@@ -62,8 +62,8 @@ def do_solve(seed: int) -> str:
     from fabfold.tree.solve import Statistics, solve
 
     effort = Effort(
-        roots=10, restarts=1, removals=1000, closing=1, looking=1, gathering=1, trying=8,
-        polishing=8, trees=1, look=40,
+        root_poses=10, restarts=1, removals=1000, closure_tests=1, planner_runs=1, starts=1,
+        polish_each=8, polish_best=8, spanning_trees=1, long_patience=40,
     )  # fmt: skip
     judge = LatticeFoldability(expansions=100, patience=20)
     counts = Statistics()

@@ -50,10 +50,10 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
     class Noting(LatticeFoldability):
         """Notes what is asked once a tree folds."""
 
-        def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        def estimate(self, system: Any, expansions: int, guide: Any = None) -> Any:
             if folds and guide is not None:
                 found.append((system, guide))
-            return super().outlook(system, expansions, guide)
+            return super().estimate(system, expansions, guide)
 
     for voxels in search_order(voxelize(load_model(model), target, seed=1)):
         with suppress(NoFoldError, NoTreeError):
@@ -61,7 +61,7 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
                 from_features(voxels, features(voxels), target),
                 seed,
                 Noting(),
-                Effort(gathering=1, trying=4000),
+                Effort(starts=1, polish_each=4000),
                 Statistics(),
                 folds.append,
                 lambda: len(found) >= wanted,

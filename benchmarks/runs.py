@@ -194,11 +194,11 @@ class Judge:
     def stuck_hinges(self, system: Any) -> Any:
         return self.judge.stuck_hinges(system)
 
-    def outlook(self, system: Any, expansions: int, guide: Any = None) -> Any:
-        return self.judge.outlook(system, expansions, guide)
+    def estimate(self, system: Any, expansions: int, guide: Any = None) -> Any:
+        return self.judge.estimate(system, expansions, guide)
 
     def unresolved(self, system: Any, expansions: int) -> float:
-        left = self.outlook(system, expansions).left
+        left = self.estimate(system, expansions).unresolved
         return float(left.sum()) / max(1, 2 * len(left))
 
     def path(self, system: Any, guide: Any = None) -> Any:

@@ -45,7 +45,7 @@ def searched(voxels: Voxels, template: str, share: bool, seeds: int) -> list[Run
     from fabfold.voxels.features import features
 
     problem = from_features(voxels, features(voxels), load_template(template), share=share)
-    effort = Effort(polishing=60, restarts=8, gathering=2)
+    effort = Effort(polish_best=60, restarts=8, starts=2)
     runs = []
     for seed in range(seeds):
         start = time.process_time()

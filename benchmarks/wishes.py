@@ -18,7 +18,8 @@ from fabfold.kit.kit import Kit
 from fabfold.lattice.rotations import FACES
 from fabfold.solid.regions import parse_region, sample_region, sample_surface
 from fabfold.voxels.region_cells import containing_voxels
-from fabfold.wishes.terms import Keep, Wishes
+from fabfold.wishes.keep import Keep
+from fabfold.wishes.wish_list import Wishes
 
 #: Axles and tracks of the sample's wheels.
 WHEELS = tuple(f"sphere({x},{y},9.8,10)" for x in (-21.5, 21.5) for y in (-13.3, 13.3))

@@ -22,7 +22,7 @@ from fabfold.tree.effort import EFFORTS
 
 pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
 
-EFFORT = replace(EFFORTS["quick"], restarts=2, polishing=20)
+EFFORT = replace(EFFORTS["quick"], restarts=2, polish_best=20)
 #: Bounds hangs only.
 LONG = 180.0
 HERE = Path(__file__).resolve().parent
@@ -144,7 +144,7 @@ def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alo
 
 def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, dask):
     heard = Results()
-    job = Job(problem, LatticeFoldability(), replace(EFFORT, polishing=10**9))
+    job = Job(problem, LatticeFoldability(), replace(EFFORT, polish_best=10**9))
 
     def over():
         return len(heard.better) == 2
@@ -162,7 +162,7 @@ def test_an_interrupted_search_leaves_the_workers_free(problem, alone, dask):
     def interrupt(_event):
         raise KeyboardInterrupt
 
-    endless = replace(EFFORT, polishing=10**9)
+    endless = replace(EFFORT, polish_best=10**9)
     with pytest.raises(KeyboardInterrupt):
         search(
             problem,
@@ -250,7 +250,7 @@ def test_a_scheduler_that_goes_away_is_told(problem, tmp_path, monkeypatch):
         def kill(_event):
             made.scheduler.kill()
 
-        endless = replace(EFFORT, polishing=10**9)
+        endless = replace(EFFORT, polish_best=10**9)
         with pytest.raises(WorkerError, match="goes on from there"):
             search(
                 problem, [0], LatticeFoldability(), endless, scheduler=made.address, on_event=kill

@@ -206,7 +206,7 @@ def test_judge_looks_at_cores_only_when_asked(slot):
     assert judge.stuck(system) == (0, 0)
     assert not judge.stuck_hinges(system).any()
     assert judge.unresolved(system, 100) == 0.0
-    assert not judge.outlook(system, 100).left.any()
+    assert not judge.estimate(system, 100).unresolved.any()
     assert LatticeFoldability(carve=CORE).path(system).tolist() == path.tolist()
 
 

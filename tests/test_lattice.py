@@ -3,6 +3,7 @@ import pytest
 
 from fabfold.errors import TemplateError
 from fabfold.lattice.rotations import (
+    FACE_BEFORE,
     FACES,
     ROTATION_INVERSE,
     ROTATION_PRODUCT,
@@ -27,6 +28,11 @@ def test_rotations_are_the_rotation_group_of_the_cube():
 def test_opposite_faces_differ_in_the_last_bit():
     for f in range(6):
         assert (FACES[f] == -FACES[f ^ 1]).all()
+
+
+def test_rotations_carry_the_face_before_to_the_face():
+    for r, rotation in enumerate(ROTATIONS):
+        assert (FACES[FACE_BEFORE[r]] @ rotation.T == FACES).all()
 
 
 @pytest.mark.parametrize("angle", [-270, -180, -90, 0, 90, 180, 270, 450])
@@ -61,6 +67,16 @@ def test_box_templates():
     assert box.occupancy(pad=1).shape == (5, 6, 6)
     assert box.occupancy(pad=1).sum() == 48
     assert parity(box.cells).sum() == 24
+
+
+def test_outer_faces_of_a_box():
+    box = load_template("box-2x3x4")
+    outer = box.outer_faces()
+    assert outer.sum() == 2 * (2 * 3 + 2 * 4 + 3 * 4)
+    for f, face in enumerate(FACES):
+        axis = f // 2
+        last = 0 if face.sum() < 0 else box.shape[axis] - 1
+        assert (outer[:, f] == (box.cells[:, axis] == last)).all()
 
 
 @pytest.mark.parametrize("name", ["box-0x4x4", "box-99x99x99", "box-4x4", "nonsense", "a/b.toml"])

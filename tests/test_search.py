@@ -19,7 +19,7 @@ from fabfold.search.seeds import Job, SeedResult
 from fabfold.tree.effort import EFFORTS
 from fabfold.tree.kinematics_check import check_tree
 
-EFFORT = replace(EFFORTS["quick"], restarts=2, polishing=20)
+EFFORT = replace(EFFORTS["quick"], restarts=2, polish_best=20)
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,7 @@ def test_better_trees_are_told_of_before_the_seed_ends(problem):
 @pytest.mark.parametrize("workers", [1, 2])
 def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, workers):
     heard = Results()
-    endless = replace(EFFORT, polishing=10**9)
+    endless = replace(EFFORT, polish_best=10**9)
     job = Job(problem, LatticeFoldability(), endless)
 
     def over():
@@ -155,7 +155,7 @@ def test_workers_end_when_their_parent_is_killed():
         "    print(*[p.pid for p in multiprocessing.active_children()], flush=True)\n"
         "if __name__ == '__main__':\n"
         "    problem = solid_problem(strip(8), 'box-2x2x2')\n"
-        "    job = Job(problem, LatticeFoldability(), replace(EFFORT, polishing=10**9))\n"
+        "    job = Job(problem, LatticeFoldability(), replace(EFFORT, polish_best=10**9))\n"
         "    with executor(2, None, 2, lambda: False) as pool:\n"
         "        run_seeds(pool, [(0, job), (1, job)], on_event, lambda: False)\n"
     )

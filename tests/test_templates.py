@@ -21,11 +21,11 @@ from fabfold.recipe.targets import find_input, load_target, named_target
 from fabfold.solid.closed_solid import Solid
 from fabfold.tree.assembly import hinge_choice
 from fabfold.tree.effort import Effort
+from fabfold.tree.initial_poses import grow
 from fabfold.tree.kinematics_check import check_tree
-from fabfold.tree.parts import parted
 from fabfold.tree.solve import solve
-from fabfold.tree.starts import grow
 from fabfold.tree.system import HingeSystem, hinge_system
+from fabfold.tree.template_parts import restrict_to_parts
 from fabfold.voxels.mesh_template import template_of_solid
 
 BOOK = """
@@ -167,10 +167,10 @@ def test_shipped_folding_templates_fold_into_a_box_without_collision(name):
 def test_a_model_folds_into_the_flat_template_and_then_shut(tmp_path):
     template = load_template(written(tmp_path, BOOK))
     problem = solid_problem(strip(16), written(tmp_path, BOOK))
-    ready = parted(problem, 3, np.zeros((16, 6)))
+    ready = restrict_to_parts(problem, 3, np.zeros((16, 6)))
     found = []
     for seed in range(6):
-        found += solve(ready, seed, LatticeFoldability(), Effort(polishing=20))
+        found += solve(ready, seed, LatticeFoldability(), Effort(polish_best=20))
         shut = [c for c in (closed(candidate, template) for candidate in found) if c is not None]
         if shut:
             break
@@ -204,18 +204,18 @@ def test_hinges_that_meet_only_when_the_template_is_shut_clash(tmp_path):
     parts = parts_of(template)
     cells = [(x, y, z) for x in range(4) for y in range(4) for z in range(2)]
     problem = solid_problem(cells, written(tmp_path, thick))
-    ready = parted(problem, 3, np.zeros((32, 6)))
+    ready = restrict_to_parts(problem, 3, np.zeros((32, 6)))
     met = 0
     for pose in islice(grow(ready, 1), 10):
         choice = hinge_choice(ready, pose)
-        at = choice.found[:, 0]
-        local = choice.found[:, 6:9] / 2.0 - problem.source[at]
+        at = choice.rows["u"]
+        local = choice.rows["edge_a"] / 2.0 - problem.source[at]
         flat = template.cells[pose[at] // 24]
         flat = flat + np.einsum("kij,kj->ki", ROTATIONS[pose[at] % 24], local)
         turn = parts.poses[parts.part[pose[at] // 24]]
         shut = np.einsum("kij,kj->ki", turn[:, :3, :3], flat) + turn[:, :3, 3]
         same = (np.abs(shut[:, None] - shut) < 1e-9).all(axis=2)
-        number = choice.found[:, 9:12]
+        number = choice.rows["edge_b"]
         assert ((number[:, None] == number).all(axis=2) == same).all()
         met += int((same & (np.abs(flat[:, None] - flat) > 1e-9).any(axis=2)).sum())
     assert met > 0
@@ -224,7 +224,7 @@ def test_hinges_that_meet_only_when_the_template_is_shut_clash(tmp_path):
 def test_voxels_that_cannot_be_shared_out_are_refused(tmp_path):
     problem = solid_problem(strip(16), written(tmp_path, BOOK), hinge=np.zeros((15, 4), bool))
     with pytest.raises(NoTreeError, match="8 \\+ 8 cells"):
-        parted(problem, 0, np.zeros((16, 6)))
+        restrict_to_parts(problem, 0, np.zeros((16, 6)))
 
 
 # --- meshes --------------------------------------------------------------------------------

@@ -1,10 +1,18 @@
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
 from fabfold.lattice.rotations import FACES, ROTATIONS, parity
-from fabfold.tree.catalogue import double_joints, edge_sides, face_transforms, single_joints, turn
+from fabfold.tree.catalogue import (
+    double_joints,
+    edge_sides,
+    edge_turn,
+    face_transforms,
+    single_joints,
+)
 
 
 @pytest.mark.parametrize("face", range(6))
@@ -49,14 +57,14 @@ def test_both_voxels_of_a_pair_name_an_edge_alike():
 def test_a_quarter_turn_goes_around_the_outside():
     for face in range(6):
         for side in range(4):
-            moved = turn(face, side, 1) @ np.append(FACES[face], 1)
+            moved = edge_turn(face, side, 1) @ np.append(FACES[face], 1)
             assert np.allclose(moved[:3], FACES[face] + FACES[edge_sides(face)[side]])
 
 
 def test_kinds_that_keep_the_colour_of_a_cell():
     for face in range(6):
-        for joint in face_transforms(face):
-            kept = int(parity(np.array(joint.offset))) == 1
-            assert kept == (sum(map(abs, joint.offset)) % 2 == 1)
+        # A child keeps its colour where it lands on the colour that the parent has not.
+        kept = [j for j in face_transforms(face) if parity(np.array(j.offset)) == 1]
+        assert Counter(j.kind for j in kept) == {"R": 1, "S": 4, "D": 52}
         assert all(parity(np.array(j.offset)) == 1 for j in single_joints(face))
         assert all(parity(np.array(j.offset)) == 1 for j in double_joints(face))

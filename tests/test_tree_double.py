@@ -16,19 +16,19 @@ from fabfold.fold.reference import TOUCH, path_overlap
 from fabfold.lattice.rotations import FACES, ROTATIONS, parity
 from fabfold.lattice.shipped import load_template
 from fabfold.tree.assembly import fold_tree, hinge_choice
-from fabfold.tree.catalogue import edge_sides, face_transforms, joint_rows, turn, ways
+from fabfold.tree.catalogue import edge_sides, edge_turn, face_transforms, joint_types, realizations
 from fabfold.tree.effort import Effort
 from fabfold.tree.fold_tree import FoldTree
-from fabfold.tree.grow import doubles_needed
+from fabfold.tree.initial_poses import grow
 from fabfold.tree.kinematics_check import check_tree
+from fabfold.tree.pose_energy import doubles_needed
 from fabfold.tree.problem import tree_problem
 from fabfold.tree.rng import generator
 from fabfold.tree.solve import solve
-from fabfold.tree.starts import grow
 from fabfold.tree.swept_cells import double_blocked, hinge_tables
 from fabfold.tree.system import HingeSystem, hinge_system
 
-QUICK = Effort(polishing=20, restarts=10)
+QUICK = Effort(polish_best=20, restarts=10)
 
 
 def doubled(cells, template, joints="S+D", hinge=None):
@@ -60,11 +60,13 @@ def tree():
 
 
 def test_rows_of_each_set_of_joints():
-    count = {name: Counter(row[0].kind for row in joint_rows(name)) for name in ("S", "S90", "all")}
+    count = {
+        name: Counter(row[0].kind for row in joint_types(name)) for name in ("S", "S90", "all")
+    }
     assert count["S"] == {"R": 1, "S": 4}
     assert count["S90"] == {"R": 1, "S": 8}
     assert count["all"] == {"R": 1, "S": 8, "D": 84}
-    assert Counter(row[0].kind for row in joint_rows("S+D")) == {"R": 1, "S": 4, "D": 32}
+    assert Counter(row[0].kind for row in joint_types("S+D")) == {"R": 1, "S": 4, "D": 32}
     assert doubled(strip(4), "box-2x2x1").keeps_colour
     assert not doubled(strip(4), "box-2x2x1", "all").keeps_colour
 
@@ -73,17 +75,19 @@ def test_rows_of_each_set_of_joints():
 def test_every_way_makes_its_joint(face):
     total = 0
     for joint in face_transforms(face):
-        for first, q1, second, q2 in ways(joint):
-            made = turn(face, first, q1)
+        for first, q1, second, q2 in realizations(joint):
+            made = edge_turn(face, first, q1)
             if second >= 0:
                 assert first != second
-                made = made @ turn(face, second, q2)
+                made = made @ edge_turn(face, second, q2)
                 total += 1
             moved = made @ np.append(FACES[face], 1.0)
             assert tuple(np.rint(moved[:3]).astype(int)) == joint.offset
             assert (np.rint(made[:3, :3]) == ROTATIONS[joint.rotation]).all()
         if joint.kind == "D" and sum(map(abs, joint.offset)) == 1:
-            assert all(3 in (way[1], way[3]) and way[1] % 2 == way[3] % 2 for way in ways(joint))
+            assert all(
+                3 in (way[1], way[3]) and way[1] % 2 == way[3] % 2 for way in realizations(joint)
+            )
     # All pairs of different edges, three turns each.
     assert total == 12 * 9
 
@@ -101,10 +105,10 @@ def test_trees_reserve_edges_voxels_and_faces():
     problem = doubled(strip(8), "box-2x2x2", hinge=rng.random((7, 4)) < 0.3)
     state = generator(5)
     with_links = 0
-    for pose in grow(problem, 3, roots=100):
+    for pose in grow(problem, 3, root_poses=100):
         choice = hinge_choice(problem, pose)
         for _ in range(10):
-            found = choice.tree(choice.wanted(set(), 0.0), state)
+            found = choice.tree(choice.preference(set(), 0.0), state)
             if found is None:
                 continue
             made = fold_tree(problem, pose, found)
@@ -154,7 +158,7 @@ def test_the_filter_agrees_with_the_planner_on_two_cubes():
             for q2 in (1, 2, 3):
                 blocked = double_blocked(
                     source, zero, one, source[0], FACES[0], sides[first], q1, sides[second], q2,
-                    tables.quarter,
+                    tables.quarter_turn,
                 )  # fmt: skip
                 system = two_cubes(first, q1, second, q2)
                 path = find_path(system).path

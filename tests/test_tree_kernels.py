@@ -10,12 +10,11 @@ from tree_cases import animal, face_pairs, solid_problem, strip
 from fabfold.lattice.rotations import FACES, ROTATIONS, parity
 from fabfold.lattice.shipped import load_template
 from fabfold.tree.assembly import hinge_choice
-from fabfold.tree.grow import clusters, energy_of
+from fabfold.tree.initial_poses import grow
+from fabfold.tree.large_neighbourhood import ruin_and_recreate
+from fabfold.tree.pose_energy import count_defects, energy_of, label_clusters
 from fabfold.tree.problem import joint_table, tree_problem
-from fabfold.tree.rebuild import apart
 from fabfold.tree.rng import generator, random_below, random_bits, random_float
-from fabfold.tree.ruin import propose
-from fabfold.tree.starts import grow
 from fabfold.tree.swept_cells import half_turn_table, hinge_tables
 
 CASES = [(30, "box-3x3x4", 1), (45, "box-3x4x4", 2), (62, "box-4x4x4", 3)]
@@ -25,7 +24,7 @@ CASES = [(30, "box-3x3x4", 1), (45, "box-3x4x4", 2), (62, "box-4x4x4", 3)]
 def grown(request):
     problem = animal(*request.param)
     poses = []
-    for pose in grow(problem, 5, roots=200):
+    for pose in grow(problem, 5, root_poses=200):
         poses.append(pose)
         if len(poses) == 3:
             break
@@ -73,10 +72,10 @@ def test_grown_poses_hang_together(grown):
         graph.add_nodes_from(range(len(pose)))
         graph.add_edges_from((u, v) for u, v, _, _ in relations(problem, pose))
         assert networkx.is_connected(graph)
-        assert apart(problem.tables, pose) == 0
+        assert count_defects(problem.tables, pose) == 0
 
 
-def test_apart_counts_missing_voxels_and_pieces(grown):
+def test_defects_are_unplaced_voxels_and_surplus_pieces(grown):
     problem, poses = grown
     pose = poses[0].copy()
     rng = np.random.default_rng(0)
@@ -87,7 +86,9 @@ def test_apart_counts_missing_voxels_and_pieces(grown):
         graph.add_edges_from(
             (u, w) for u, w, _, _ in relations(problem, pose) if pose[u] >= 0 and pose[w] >= 0
         )
-        assert apart(problem.tables, pose) == networkx.number_connected_components(graph) - 1
+        assert (
+            count_defects(problem.tables, pose) == networkx.number_connected_components(graph) - 1
+        )
 
 
 def test_clusters_and_energy(grown):
@@ -99,7 +100,7 @@ def test_clusters_and_energy(grown):
             if joint.kind == "R":
                 graph.add_edge(u, v)
         label = np.empty(len(pose), np.int32)
-        found = clusters(problem.tables, pose, label)
+        found = label_clusters(problem.tables, pose, label)
         pieces = list(networkx.connected_components(graph))
         assert found == len(pieces)
         for piece in pieces:
@@ -107,7 +108,7 @@ def test_clusters_and_energy(grown):
 
         total = float(sum(problem.tables.cost[v, q] for v, q in enumerate(pose.tolist())))
         for cell in set(range(len(problem.template))) - set((pose // 24).tolist()):
-            total += 0.3 * int((problem.tables.around[cell] < 0).sum())
+            total += 0.3 * int((problem.tables.cell_neighbour[cell] < 0).sum())
         energy, number = energy_of(problem.tables, pose, problem.empty_face)
         assert number == found
         assert energy == pytest.approx(total + 0.1 * (found - 1), abs=1e-4)
@@ -130,14 +131,14 @@ def test_cost_is_the_weighted_depth_of_the_faces_that_show():
                 assert problem.tables.cost[v, 24 * cell + r] == pytest.approx(wanted, abs=1e-6)
 
 
-def test_bias_is_added_and_stiff_pairs_stay_whole():
+def test_extra_cost_is_added_and_some_pairs_stay_rigid():
     cells = strip(8)
     pairs = face_pairs(cells)
     template = load_template("box-2x2x2")
-    bias = np.zeros((8, 24 * len(template)))
-    bias[3, 5] = 7.0
-    stiff = np.zeros(len(pairs), dtype=bool)
-    stiff[3] = True
+    extra_cost = np.zeros((8, 24 * len(template)))
+    extra_cost[3, 5] = 7.0
+    always_rigid = np.zeros(len(pairs), dtype=bool)
+    always_rigid[3] = True
     problem = tree_problem(
         np.array(cells),
         template,
@@ -145,15 +146,15 @@ def test_bias_is_added_and_stiff_pairs_stay_whole():
         rigid=np.ones(len(pairs), dtype=bool),
         hinge=np.ones((len(pairs), 4), dtype=bool),
         depth=np.zeros((8, 6)),
-        bias=bias,
-        stiff=stiff,
+        extra_cost=extra_cost,
+        always_rigid=always_rigid,
     )
     assert problem.tables.cost[3, 5] == pytest.approx(7.0)
     i, j = pairs[3].tolist()
     face = int(np.flatnonzero((problem.source[j] - problem.source[i] == FACES).all(axis=1))[0])
     found = 0
     for pose in grow(problem, 1):
-        assert problem.tables.step[face, 0, pose[i]] == pose[j]
+        assert problem.tables.child_pose[face, 0, pose[i]] == pose[j]
         found += 1
         if found == 5:
             break
@@ -234,9 +235,11 @@ def test_hinges_offered_are_possible_and_complete(grown):
             )
             if not clash:
                 wanted.add((u, v))
-        assert {(int(a), int(b)) for a, b in choice.found[:, :2]} == wanted
+        assert {(int(a), int(b)) for a, b in choice.rows[["u", "v"]]} == wanted
 
 
+# Grown poses of the larger cases leave clusters that no hinge joins.
+@pytest.mark.parametrize("grown", CASES[:1], indirect=True)
 def test_spanning_trees_span_without_sharing_an_edge(grown):
     problem, poses = grown
     state = generator(3)
@@ -244,7 +247,7 @@ def test_spanning_trees_span_without_sharing_an_edge(grown):
     for pose in poses:
         choice = hinge_choice(problem, pose)
         for _ in range(5):
-            tree = choice.tree(choice.wanted(set(), 0.0), state)
+            tree = choice.tree(choice.preference(set(), 0.0), state)
             if tree is None:
                 continue
             spanned += 1
@@ -255,10 +258,10 @@ def test_spanning_trees_span_without_sharing_an_edge(grown):
             assert len(set(map(tuple, tree.system.point2.tolist()))) == len(tree.joints)
             sizes = np.bincount(tree.system.body)
             assert sizes[0] == sizes.max()
-    assert spanned or len(poses[0]) > 40
+    assert spanned > 5
 
 
-def test_proposals_keep_what_they_promise(grown):
+def test_recreated_poses_stay_below_the_threshold(grown):
     problem, poses = grown
     out = np.empty(len(problem), np.int32)
     state = generator(11)
@@ -267,7 +270,7 @@ def test_proposals_keep_what_they_promise(grown):
     found = 0
     for _ in range(30):
         limit = energy + 0.5
-        used, value, left = propose(
+        used, value, left = ruin_and_recreate(
             problem.tables, pose, problem.empty_face, hinge_tables(), 0.0, limit,
             np.empty(0, np.int32), 20, 4, 12, 6, 0.05, 1.0, state, out,
         )  # fmt: skip
@@ -278,7 +281,7 @@ def test_proposals_keep_what_they_promise(grown):
             assert value == pytest.approx(
                 energy_of(problem.tables, out, problem.empty_face)[0], abs=1e-9
             )
-            assert apart(problem.tables, out) == 0
+            assert count_defects(problem.tables, out) == 0
             assert len(set((out // 24).tolist())) == len(out)
             assert left >= 0
             pose, energy = out.copy(), value

@@ -23,16 +23,23 @@ from fabfold.lattice.shipped import load_template
 from fabfold.proof.certify import certify
 from fabfold.proof.replay import replay
 from fabfold.tree.assembly import hinge_choice
+from fabfold.tree.beam import fill_beam
 from fabfold.tree.catalogue import edge_sides
 from fabfold.tree.effort import Effort
 from fabfold.tree.fold_tree import FoldTree
-from fabfold.tree.grow import energy_of, fill_beam
+from fabfold.tree.initial_poses import grow
 from fabfold.tree.kinematics_check import check_tree
+from fabfold.tree.pose_energy import energy_of
 from fabfold.tree.problem import from_features, tree_problem
 from fabfold.tree.rng import generator
-from fabfold.tree.sharing import octant_masks, seen_depths, shared_octants, turned_masks, unpacked
+from fabfold.tree.sharing import (
+    octant_masks,
+    quarter_depths,
+    shared_octants,
+    turned_masks,
+    unpacked,
+)
 from fabfold.tree.solve import solve
-from fabfold.tree.starts import grow
 from fabfold.tree.system import hinge_system
 from fabfold.voxels.features import features
 
@@ -97,7 +104,7 @@ def test_eighths_that_do_not_hang_together_take_the_whole_cell():
 
 def test_depth_of_quarters_is_that_of_the_rays():
     material = some_material(5, seed=3)
-    found = seen_depths(material, 0.3)
+    found = quarter_depths(material, 0.3)
     for r, rotation in enumerate(ROTATIONS):
         for v, cell in enumerate(material):
             here = turned(cell, rotation)
@@ -137,7 +144,7 @@ def grown(problem, material, limit=60):
     state = generator(7)
     rng = np.random.default_rng(1)
     out = np.empty((8, len(problem)), np.int32)
-    for number, pose in enumerate(grow(problem, 2, roots=40)):
+    for number, pose in enumerate(grow(problem, 2, root_poses=40)):
         yield pose
         for _ in range(limit):
             start = pose.copy()
@@ -163,7 +170,7 @@ def test_voxels_share_only_where_their_eighths_differ():
     shared = 0
     for pose in grown(problem, material):
         pairs = together(pose)
-        assert len(pairs) <= problem.tables.shares == 2
+        assert len(pairs) <= problem.tables.max_shared == 2
         for u, v in pairs:
             one, two = (turned(material[w], ROTATIONS[pose[w] % 24]) for w in (u, v))
             assert not (one & two).any()
@@ -202,18 +209,18 @@ def test_nearer_material_is_seen_in_a_shared_cell():
 
 def test_hinges_of_guests_lie_in_their_own_eighths():
     problem, material = crowd()
-    masks = problem.tables.mask[:, 0]
+    masks = problem.tables.octant_mask[:, 0]
     seen = 0
     for pose in grown(problem, material, limit=20):
         guests = {int(v) for pair in together(pose) for v in pair}
         octants = shared_octants(pose, masks)
         assert (octants is None) == (not guests)
-        for row in hinge_choice(problem, pose).found:
-            for v, face in ((row[0], row[4]), (row[1], row[4] ^ 1)):
+        for row in hinge_choice(problem, pose).rows:
+            for v, face in ((row["u"], row["face"]), (row["v"], row["face"] ^ 1)):
                 if int(v) not in guests:
                     continue
                 seen += 1
-                middle = row[6:9] - 2 * problem.source[v]
+                middle = row["edge_a"] - 2 * problem.source[v]
                 assert (middle * FACES[face]).sum() == 1
                 own = unpacked(masks[v : v + 1])[0]
                 beside = np.ones((2, 2, 2), dtype=bool)
@@ -227,8 +234,8 @@ def test_hinges_of_guests_lie_in_their_own_eighths():
 
 def test_without_sharing_there_is_nothing_of_it():
     problem = solid_problem(strip(8), "box-2x2x2")
-    assert problem.tables.shares == 0 and (problem.tables.mask == 255).all()
-    for pose in grow(problem, 1, roots=5):
+    assert problem.tables.max_shared == 0 and (problem.tables.octant_mask == 255).all()
+    for pose in grow(problem, 1, root_poses=5):
         assert hinge_choice(problem, pose).octants is None
     full = np.ones((8, SIZE, SIZE, SIZE), dtype=bool)
     cells = np.array(strip(8))
@@ -240,7 +247,7 @@ def test_without_sharing_there_is_nothing_of_it():
         "depth": np.zeros((8, 6)),
     }
     full_problem = tree_problem(cells, load_template("box-2x2x2"), share=full, **arguments)
-    assert full_problem.tables.shares == 0
+    assert full_problem.tables.max_shared == 0
     with pytest.raises(NoTreeError, match="cannot go into"):
         tree_problem(cells, load_template("box-2x2x1"), share=full, **arguments)
 
@@ -273,7 +280,7 @@ def folded():
     with pytest.raises(NoTreeError, match="cannot go into"):
         from_features(voxels, features(voxels), template)
     problem = from_features(voxels, features(voxels), template, share=True)
-    found = solve(problem, 0, LatticeFoldability(), Effort(polishing=10, restarts=10))
+    found = solve(problem, 0, LatticeFoldability(), Effort(polish_best=10, restarts=10))
     return voxels, problem, found[0]
 
 
@@ -302,7 +309,8 @@ def test_path_is_free_for_eighths_and_not_for_cells(folded):
     assert free_moves(system, path) == len(path)
     assert free_moves(system._replace(octants=None), path) < len(path)
     judge = LatticeFoldability()
-    assert judge.stuck(system) == (0, 0) and judge.unresolved(system, 400) == 0.0
+    assert not judge.stuck_hinges(system).any()
+    assert not judge.estimate(system, 400).unresolved.any()
 
 
 def test_checker_refuses_what_must_not_share(folded):

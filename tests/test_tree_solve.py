@@ -4,18 +4,18 @@ import pickle
 
 import numpy as np
 import pytest
-from tree_cases import animal, face_pairs, solid_problem, strip
+from tree_cases import animal, solid_problem, strip
 
 from fabfold.errors import NoFoldError, NoTreeError
 from fabfold.fold.lattice_foldability import LatticeFoldability
 from fabfold.fold.lattice_paths import free_moves
-from fabfold.tree.effort import EFFORTS, Effort
+from fabfold.tree.effort import Effort
+from fabfold.tree.initial_poses import grow
 from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.solve import solve
-from fabfold.tree.starts import grow
 from fabfold.tree.system import hinge_system
 
-QUICK = Effort(polishing=100, restarts=10)
+QUICK = Effort(polish_best=100, restarts=10)
 
 
 def energies(candidates):
@@ -67,13 +67,10 @@ def test_more_voxels_than_cells():
 
 
 def test_voxels_without_a_printable_joint():
-    cells = strip(4)
-    pairs = face_pairs(cells)
     rigid = np.array([True, False, True])
     hinge = np.tile(rigid[:, None], (1, 4))
     with pytest.raises(NoTreeError, match="no printable joint"):
-        solid_problem(cells, "box-2x2x1", rigid=rigid, hinge=hinge)
-    assert len(pairs) == 3
+        solid_problem(strip(4), "box-2x2x1", rigid=rigid, hinge=hinge)
 
 
 def test_hinges_stay_on_printable_edges():
@@ -155,18 +152,12 @@ def test_full_template_of_125_cells_is_filled():
 
 def test_nothing_folds_without_budget(dog):
     class Stubborn(LatticeFoldability):
-        def outlook(self, system, expansions, guide=None):
+        def estimate(self, system, expansions, guide=None):
             return (
                 super()
-                .outlook(system, 1)
-                ._replace(left=np.ones(len(system.parent), dtype=np.int32))
+                .estimate(system, 1)
+                ._replace(unresolved=np.ones(len(system.parent), dtype=np.int32))
             )
 
     with pytest.raises(NoFoldError, match="none of"):
         solve(dog, 0, Stubborn(), Effort(restarts=2))
-
-
-def test_efforts_grow():
-    quick, normal, thorough = (EFFORTS[name] for name in ("quick", "normal", "thorough"))
-    assert quick.polishing < normal.polishing < thorough.polishing
-    assert quick.restarts <= normal.restarts <= thorough.restarts

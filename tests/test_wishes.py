@@ -37,9 +37,12 @@ from fabfold.tree.solve import solve
 from fabfold.voxels.features import features
 from fabfold.voxels.region_cells import containing_voxels, to_lattice
 from fabfold.voxels.voxelize import voxelize
-from fabfold.wishes.terms import Keep, Wishes, hinges_outside, rank_by_cuts, uncut_pairs
+from fabfold.wishes.joints_inside import count_surface_hinges
+from fabfold.wishes.keep import Keep, keep_root_poses
+from fabfold.wishes.protect import rank_by_cuts, rigid_pairs
+from fabfold.wishes.wish_list import Wishes
 
-EFFORT = replace(EFFORTS["quick"], polishing=200, restarts=6)
+EFFORT = replace(EFFORTS["quick"], polish_best=200, restarts=6)
 
 
 def bar(length=8.0, width=2.0, height=2.0):
@@ -60,16 +63,16 @@ def cut(solid, template, rotation=None):
 
 def search(voxels, template, wishes, seed=0):
     shape, found = load_template(template), features(voxels)
-    uncut = wishes.uncut(voxels, found, shape)
+    protected = wishes.protected(voxels, found, shape)
     problem = from_features(
         voxels,
         found,
         shape,
-        bias=wishes.bias(voxels, shape),
-        stiff=uncut_pairs(uncut, found),
+        extra_cost=wishes.extra_cost(voxels, shape),
+        always_rigid=rigid_pairs(protected, found),
     )
-    problem = wishes.apply(problem, voxels, shape)
-    return solve(problem, seed, LatticeFoldability(), EFFORT)[0].tree, uncut
+    problem = wishes.with_roots(problem, voxels, shape)
+    return solve(problem, seed, LatticeFoldability(), EFFORT)[0].tree, protected
 
 
 @pytest.mark.parametrize(
@@ -147,7 +150,7 @@ def test_points_follow_the_grid():
     assert containing_voxels(voxels, np.array([[9.0, 0.5, 0.5]])) == [-1]
     # The grid lies across: the front (-y) of the model is on a lattice face of x.
     keep = Keep("front:+x", sample_surface(bar(), parse_side("front", "")), 0)
-    share, whole = keep.by_voxel(voxels)
+    share, whole = keep.area_by_face(voxels)
     face = int(np.flatnonzero((turn @ [0, -1, 0] == FACES).all(axis=1))[0])
     assert whole == pytest.approx(16.0, rel=0.03)
     assert share[:, face].sum() == pytest.approx(16.0, rel=0.03)
@@ -161,8 +164,8 @@ def test_protected_voxels_are_one_body():
     wishes = Wishes(regions=(region,))
     plain = [search(voxels, "box-4x4x2", Wishes(), seed)[0] for seed in range(4)]
     before = [wishes.report(voxels, tree)[0]["share"] for tree in plain]
-    tree, uncut = search(voxels, "box-4x4x2", wishes)
-    (group,) = uncut[0].groups
+    tree, protected = search(voxels, "box-4x4x2", wishes)
+    (group,) = protected[0].groups
     assert len(group) == 8
     assert check_tree(tree) == []
     assert len(set(tree.voxel_body[list(group)].tolist())) == 1
@@ -176,9 +179,7 @@ def test_protected_region_too_long_for_the_template():
     voxels = cut(solid, "box-4x4x2")
     region = sample_region(solid, parse_region("box(1,0,0,7,2,2)", "--protect"))
     with pytest.raises(NoTreeError, match="fit template 'box-4x4x2' nowhere"):
-        rank_by_cuts(
-            Wishes(regions=(region,)), [(voxels, features(voxels))], load_template("box-4x4x2")
-        )
+        rank_by_cuts([region], [(voxels, features(voxels))], load_template("box-4x4x2"))
 
 
 def test_protected_region_held_by_too_little():
@@ -195,7 +196,7 @@ def test_protected_region_held_by_too_little():
     solid = bar(4, 1, 1)
     region = sample_region(solid, parse_region("box(1.2,0,0,2.8,1,1)", "--protect"))
     with pytest.raises(NoTreeError, match="cannot be printed as one piece"):
-        Wishes(regions=(region,)).uncut(voxels, weak, load_template("box-4x1x1"))
+        Wishes(regions=(region,)).protected(voxels, weak, load_template("box-4x1x1"))
 
 
 def test_grids_with_few_cuts_come_first():
@@ -208,7 +209,7 @@ def test_grids_with_few_cuts_come_first():
         for shift in ((0.0, 0.5, 0.5), (0.5, 0.5, 0.5))
     )
     options = [(voxels, features(voxels)) for voxels in (across, within)]
-    assert rank_by_cuts(Wishes(regions=(region,)), options, shape) == [1, 0]
+    assert rank_by_cuts([region], options, shape) == [1, 0]
 
 
 def test_kept_share_rises():
@@ -239,11 +240,11 @@ def test_empty_space_is_priced_as_it_lies():
     visible = (shape.cells != 1).any(axis=1)
     for void in (1.0, -0.5):
         wishes = Wishes(void=void)
-        bias = wishes.bias(voxels, shape)
+        cost = wishes.extra_cost(voxels, shape)
         costs, emptiness = [], []
         for _ in range(4):
             cells = rng.permutation(27)[:24]
-            costs.append(bias[np.arange(24), 24 * cells + rng.integers(24, size=24)].sum())
+            costs.append(cost[np.arange(24), 24 * cells + rng.integers(24, size=24)].sum())
             full = np.zeros(27)
             full[cells] = voxels.fill
             dear = visible if void > 0 else ~visible
@@ -269,8 +270,8 @@ def test_hinges_inside_are_inside():
     inside = replace(anywhere, joints="inside")
     loose = solve(small_problem(anywhere), 0, LatticeFoldability(), EFFORT)[0].tree
     tree = solve(small_problem(inside), 0, LatticeFoldability(), EFFORT)[0].tree
-    assert hinges_outside(loose) > 0
-    assert hinges_outside(tree) == 0
+    assert count_surface_hinges(loose) > 0
+    assert count_surface_hinges(tree) == 0
     assert check_tree(tree) == []
     # By hand: in B every hinge's edge lies strictly within the box.
     root = tree.root_rotation, tree.root_translation
@@ -323,21 +324,21 @@ def test_painted_faces_are_a_region(tmp_path):
     voxels = cut(solid, "box-4x4x2")
     recipe = make_recipe(model="eyes.ply", template="box-4x4x2", protect=("painted",))
     wishes = make_wishes(recipe, solid)
-    (uncut,) = wishes.uncut(voxels, features(voxels), load_template("box-4x4x2"))
-    for group in uncut.groups:
+    (protected,) = wishes.protected(voxels, features(voxels), load_template("box-4x4x2"))
+    for group in protected.groups:
         assert (voxels.cells[list(group), 2] == 1).all()
-    assert len(uncut.groups) == 2
+    assert len(protected.groups) == 2
     with pytest.raises(RecipeError, match="#0000ff"):
         sample_region(solid, parse_region("painted(#00ff00)", ""))
     with pytest.raises(RecipeError, match="no face of the model is painted"):
         sample_region(bar(), parse_region("painted", ""))
 
 
-def test_anchors_show_what_they_hold():
+def test_root_poses_show_the_kept_part_on_its_side():
     voxels = cut(bar(), "box-4x4x2")
     shape = load_template("box-4x4x2")
     keep = Keep("left:-y", sample_surface(bar(), parse_side("left", "")), 3)
-    for voxel, pose in Wishes(keeps=(keep,)).anchors(voxels, shape, [0]).tolist():
+    for voxel, pose in keep_root_poses([keep], voxels, shape, [0]).tolist():
         cell, rotation = shape.cells[pose // 24], ROTATIONS[pose % 24]
         assert voxels.cells[voxel, 0] == 0
         assert cell[1] == 0

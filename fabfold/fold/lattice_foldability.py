@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.tree.foldability import Outlook
+from fabfold.tree.foldability import PlannerEstimate
 from fabfold.tree.system import HingeSystem
 
 if TYPE_CHECKING:
@@ -88,9 +88,9 @@ class LatticeFoldability:
 
         return stuck_hinges(self._seen(system), carve=self.carve)
 
-    def outlook(
+    def estimate(
         self, system: HingeSystem, expansions: int, guide: NDArray[np.int32] | None = None
-    ) -> Outlook:
+    ) -> PlannerEstimate:
         """What the planner could not resolve, and the steps that it found.
 
         Parameters
@@ -102,7 +102,7 @@ class LatticeFoldability:
             Steps found for a similar system, to be tried first.
         """
         found = self._look(system, expansions, guide)
-        return Outlook(found.apart, found.guide)
+        return PlannerEstimate(found.apart, found.guide)
 
     def unresolved(self, system: HingeSystem, expansions: int) -> float:
         """Share of the quarter turns that the planner could not resolve.
@@ -168,7 +168,7 @@ class LatticeFoldability:
         ----------
         system : HingeSystem
         guide : (g, 5) int32 array, optional
-            Steps that :meth:`outlook` found for the system, to be tried first.
+            Steps that :meth:`estimate` found for the system, to be tried first.
 
         Returns
         -------

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from fabfold.solid.closed_solid import Solid
     from fabfold.tree.solve import Candidate
     from fabfold.voxels.voxel_model import Voxels
-    from fabfold.wishes.terms import Wishes
+    from fabfold.wishes.wish_list import Wishes
 
 __all__ = ["Kit", "open_kit"]
 

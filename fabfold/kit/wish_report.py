@@ -11,7 +11,7 @@ from fabfold.joinery.bodies import Joinery
 from fabfold.kit.stages import Attempt
 from fabfold.voxels.region_cells import containing_voxels, to_lattice
 from fabfold.voxels.voxel_model import Voxels
-from fabfold.wishes.terms import Wishes
+from fabfold.wishes.wish_list import Wishes
 
 __all__ = ["printed_share", "wish_report"]
 

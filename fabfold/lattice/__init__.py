@@ -1,1 +1,1 @@
-"""The cubic lattice: rotations, templates, swept cells."""
+"""The cubic lattice: its 24 rotations, target shapes, and what a quarter turn sweeps."""

@@ -1,8 +1,9 @@
 """Templates that fold once more: their parts, and the shape that they end in.
 
 A template with creases is filled flat and then folded along them (paper section 1: "a template
-that can be easily folded into a box"). The creases divide it into parts, which hang on each other
-like the bodies of a joint tree: every crease joins one part that stays to one that turns.
+that can be easily folded into a box"). The creases divide it into parts, the panels of rigid
+origami. Parts form a tree like the bodies of a joint tree: every crease joins one part that stays
+to one that turns.
 """
 
 from __future__ import annotations
@@ -43,27 +44,53 @@ class Parts:
     shift: IntArray
 
     def landed(self, cells: IntArray) -> IntArray:
-        """Where each cell of the template ends, (m, 3), smallest coordinate 0 on every axis."""
+        """Where each cell of the template ends.
+
+        Parameters
+        ----------
+        cells : (m, 3) int32 array
+            Cells of the template, in its order.
+
+        Returns
+        -------
+        (m, 3) int32 array
+            Cells of the folded shape, smallest coordinate 0 on every axis.
+        """
         turned = np.einsum("mij,mj->mi", self.poses[self.part, :3, :3], cells.astype(float))
         moved = turned + self.poses[self.part, :3, 3] + self.shift
         return np.asarray(np.rint(moved), dtype=np.int32)
 
 
 def line_of(crease: Crease) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A point of the crease's line and its direction, lattice coordinates."""
+    """The line of a crease.
+
+    Parameters
+    ----------
+    crease : Crease
+        A crease of any template.
+
+    Returns
+    -------
+    point : (3,) float64 array
+        A point of the line, lattice coordinates.
+    direction : (3,) float64 array
+        Unit vector from its start to its end.
+    """
     start = np.array(crease.start, dtype=float)
     return start - 0.5, np.sign(np.array(crease.end, dtype=float) - start)
 
 
 def rim_of(template: Template, parts: Parts, number: int) -> list[tuple[int, int]]:
-    """Pairs of cells, one of each side, that share a face with an edge on a part's crease.
+    """Pairs of cells, one on each side, that share a face with an edge on a part's crease.
 
     Parameters
     ----------
     template : Template
+        A template with creases.
     parts : Parts
+        Its parts.
     number : int
-        The part that turns.
+        The part that turns about the crease.
 
     Returns
     -------
@@ -101,6 +128,16 @@ def rim_of(template: Template, parts: Parts, number: int) -> list[tuple[int, int
 
 def parts_of(template: Template) -> Parts:
     """Divide a template by its creases.
+
+    Parameters
+    ----------
+    template : Template
+        A template with or without creases.
+
+    Returns
+    -------
+    Parts
+        One part more than there are creases.
 
     Raises
     ------
@@ -148,10 +185,16 @@ def parts_of(template: Template) -> Parts:
 def check_creases(template: Template) -> None:
     """Refuse creases that cannot be folded.
 
+    Parameters
+    ----------
+    template : Template
+        A template with or without creases.
+
     Raises
     ------
     ValueError
-        Naming the fold and what is wrong with it.
+        If a crease has no room for a hinge, or two cells end in one place. The message names the
+        fold.
     """
     if not template.creases:
         return
@@ -177,7 +220,18 @@ def check_creases(template: Template) -> None:
 
 
 def folded_template(template: Template) -> Template:
-    """The shape that a template with creases ends in; a template without any is itself."""
+    """The shape that a template with creases ends in.
+
+    Parameters
+    ----------
+    template : Template
+        A template with or without creases.
+
+    Returns
+    -------
+    Template
+        Without creases; `template` itself where it has none.
+    """
     if not template.creases:
         return template
     folded = Template(f"{template.name}-folded", parts_of(template).landed(template.cells))

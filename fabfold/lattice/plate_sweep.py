@@ -1,13 +1,14 @@
-"""What the link plate of a double hinge passes over in a quarter turn about a lattice edge.
+"""What the link plate of a double hinge meets in a quarter turn about a lattice edge.
 
-A plate is a face of the lattice, 1/10 of a voxel thick. Where the axis of the turn lies along it,
-the plate is a unit segment in the plane of the turn and sweeps cells; the rule for squares in
+The planner of the folding stage needs it for trees with double hinges. A plate is a face of the
+lattice, 1/10 of a voxel thick. Where the axis of the turn lies along it, the plate is a unit
+segment in the plane of the turn and sweeps cells; the rule for squares in
 :mod:`fabfold.lattice.sweep` holds, with an arc of no width. Where the axis stands upright on it,
 the plate turns in its own plane between two layers of cells and sweeps none. Bodies that it only
 grazes or that it comes to rest on are let in for it, so a plate may lie on any face.
 
-Two plates may not pass through each other, nor a plate and a barrel: nothing can be carved there.
-Plates stand back from the edges without a barrel by a barrel's room, so a barrel may lie there.
+Two plates may not pass through each other, nor a plate and a barrel: nothing can be carved there. A
+plate stands back from its edges without a barrel, so that another hinge's barrel fits there.
 """
 
 # mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
@@ -20,7 +21,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.lattice.segments import INSET, segments_meet
+from fabfold.lattice.segments import INSET, segment_distance, segments_meet
 
 __all__ = [
     "BARREL_HALF",
@@ -35,16 +36,16 @@ __all__ = [
 
 #: Half the thickness of a plate, of the voxel: 2 mm at 20 mm.
 _THICK = 0.05
-#: Barrel's radius and clearance, of the voxel.
-_ROOM = 0.14
-#: Half the side of a plate, less the room of a barrel at both ends.
-PLATE_HALF = 0.5 - _ROOM
+#: A barrel's radius and its clearance together, of the voxel.
+_BARREL_RADIUS = 0.14
+#: Half the side of a plate, which leaves space for a barrel at both ends.
+PLATE_HALF = 0.5 - _BARREL_RADIUS
 #: Two plates may not come nearer than this: their thickness and the clearance.
 PLATE_LEAST = 2 * _THICK + 0.015 - 1e-3
 #: The same for the middle of a plate and the axis of a barrel: a ball about any point of this
 #: part of the plate, as wide as the plate is thick, lies inside the plate.
 PLATE_CORE = PLATE_HALF - _THICK
-POST_LEAST = _ROOM + _THICK - 1e-3
+POST_LEAST = _BARREL_RADIUS + _THICK - 1e-3
 #: Half the length of a barrel's inner axis.
 BARREL_HALF = 0.5 - INSET
 
@@ -62,17 +63,25 @@ class PlateTable(NamedTuple):
     Attributes
     ----------
     cell_start : (4 * side * side + 1,) int32 array
+        Where the squares of each plate along the axis begin in `cells`.
     cells : (k, 2) int16 array
         ``cells[cell_start[i] : cell_start[i + 1]]``: squares that a plate along the axis sweeps.
-    post_start, posts
-        Likewise, twice the places of barrels along the axis that it meets.
-    plate_start, plates
-        Likewise, twice the middles of other such plates.
+    post_start : (4 * side * side + 1,) int32 array
+        Where the barrels of each plate along the axis begin in `posts`.
+    posts : (k, 2) int16 array
+        Twice the places of barrels along the axis that a plate along the axis meets.
+    plate_start : (4 * side * side + 1,) int32 array
+        Where the plates of each plate along the axis begin in `plates`.
+    plates : (k, 2) int16 array
+        Twice the middles of other plates along the axis that it meets.
     sheet_start : (side * side + 1,) int32 array
+        Where the squares of each plate across the axis begin in `sheets`.
     sheets : (k, 2) int16 array
         Squares that a plate across the axis sweeps.
-    edge_start, edges
-        Likewise, twice the middles of barrels across the axis that it meets.
+    edge_start : (side * side + 1,) int32 array
+        Where the barrels of each plate across the axis begin in `edges`.
+    edges : (k, 2) int16 array
+        Twice the middles of barrels across the axis that a plate across the axis meets.
     """
 
     cell_start: I32
@@ -140,6 +149,7 @@ def _sheet_meets(a: int, b: int, c: int, d: int, core: float, half: float, least
 def _side_meets(
     x: float, y: float, flat: bool, core: float, c: int, d: int, half: float, least: float
 ) -> bool:
+    """Whether one side of a turning square comes near the segment with middle (c, d) / 2."""
     from_x, from_y = (x - core, y) if flat else (x, y - core)
     to_x, to_y = (x + core, y) if flat else (x, y + core)
     sx = half if c % 2 != 0 else 0.0
@@ -149,7 +159,7 @@ def _side_meets(
     while True:
         cosine = np.cos(angle)
         sine = np.sin(angle)
-        away = _apart(
+        away = segment_distance(
             from_x * cosine - from_y * sine,
             from_x * sine + from_y * cosine,
             to_x * cosine - to_y * sine,
@@ -167,31 +177,8 @@ def _side_meets(
 
 
 @njit(cache=True)
-def _apart(
-    ax: float, ay: float, bx: float, by: float, px: float, py: float, qx: float, qy: float
-) -> float:
-    least = 1e9
-    for k in range(4):
-        if k == 0:
-            x, y, ux, uy, vx, vy = ax, ay, px, py, qx, qy
-        elif k == 1:
-            x, y, ux, uy, vx, vy = bx, by, px, py, qx, qy
-        elif k == 2:
-            x, y, ux, uy, vx, vy = px, py, ax, ay, bx, by
-        else:
-            x, y, ux, uy, vx, vy = qx, qy, ax, ay, bx, by
-        dx = vx - ux
-        dy = vy - uy
-        length = dx * dx + dy * dy
-        share = 0.0
-        if length > 0.0:
-            share = min(1.0, max(0.0, ((x - ux) * dx + (y - uy) * dy) / length))
-        least = min(least, np.hypot(x - ux - share * dx, y - uy - share * dy))
-    return least
-
-
-@njit(cache=True)
 def _add(rows: I16, count: int, c: int, d: int) -> I16:
+    """Write (c, d) to row `count` of `rows`, twice as long where it is full; returns the rows."""
     if count == len(rows):
         wider = np.empty((2 * count, 2), np.int16)
         wider[:count] = rows
@@ -289,13 +276,25 @@ def _across(side: int, core: float, half: float, least: float, edge_start: I32) 
 
 
 def plate_table(side: int, sheet_start: I32, sheets: I16, *, halves: bool) -> PlateTable:
-    """Table of plates beside the table of cells that has `side`, `sheet_start` and `sheets`.
+    """Table of plates that goes with a table of cells.
 
     Parameters
     ----------
+    side : int
+        Squares along each side of the first quadrant, see
+        :class:`fabfold.lattice.sweep.SweepTable`.
+    sheet_start : (side * side + 1,) int32 array
+        ``SweepTable.start``: a plate across the axis sweeps what a square sweeps.
+    sheets : (k, 2) int16 array
+        ``SweepTable.cells``.
     halves : bool
         The lattice is one of half cells, see :func:`fabfold.lattice.sweep.sweep_table`: plates and
         barrels are cut up there, and only those that really cross or coincide count as meeting.
+
+    Returns
+    -------
+    PlateTable
+        For plates up to `side` from the axis.
     """
     core, half = (0.25, 0.25) if halves else (PLATE_CORE, BARREL_HALF)
     post_least = 0.2 if halves else POST_LEAST

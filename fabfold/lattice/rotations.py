@@ -1,4 +1,4 @@
-"""The cubic lattice: cells, faces, the 24 rotations, templates.
+"""The cubic lattice: its faces and its 24 rotations.
 
 Lattice coordinates count voxels: the centre of cell ``(i, j, k)`` is the point
 ``(i, j, k)`` and a voxel's side is 1.
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "FACES",
+    "FACE_BEFORE",
     "ROTATIONS",
     "ROTATION_INVERSE",
     "ROTATION_PRODUCT",
@@ -47,7 +48,18 @@ ROTATIONS: IntArray = _proper_rotations()
 
 
 def rotation_of_degrees(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Rotation about x, then y, then z of the fixed axes, as a (3, 3) matrix."""
+    """Rotation about x, then y, then z of the fixed axes.
+
+    Parameters
+    ----------
+    degrees : tuple of 3 float
+        Right-handed angles about x, y and z, degrees.
+
+    Returns
+    -------
+    (3, 3) float64 array
+        The rotation matrix.
+    """
     origin = np.zeros(3)
     turns = [
         rotation_about(origin, axis, angle)[:3, :3]
@@ -63,6 +75,11 @@ def rotation_index(matrix: NDArray[np.generic]) -> int:
     ----------
     matrix : (3, 3) array
         A proper rotation with entries near -1, 0 and 1.
+
+    Returns
+    -------
+    int
+        From 0 to 23.
 
     Raises
     ------
@@ -84,6 +101,13 @@ ROTATION_PRODUCT: IntArray = np.array(
 ROTATION_INVERSE: IntArray = np.array([rotation_index(a.T) for a in ROTATIONS], dtype=np.int32)
 
 
+#: Face that each rotation turns towards each face, shape (24, 6): rotation ``r`` carries
+#: ``FACES[FACE_BEFORE[r, f]]`` to ``FACES[f]``.
+FACE_BEFORE: NDArray[np.int64] = np.array(
+    [[int(np.flatnonzero((d @ r == FACES).all(axis=1))[0]) for d in FACES] for r in ROTATIONS]
+)
+
+
 def rotation_about(
     point: NDArray[np.generic], direction: NDArray[np.generic], angle_deg: float
 ) -> NDArray[np.float64]:
@@ -92,7 +116,7 @@ def rotation_about(
     Parameters
     ----------
     point : (3,) array
-        A point on the axis.
+        A point on the axis, in any unit of length.
     direction : (3,) array
         The direction of the axis; its length does not matter.
     angle_deg : float
@@ -101,7 +125,8 @@ def rotation_about(
     Returns
     -------
     (4, 4) float64 array
-        Homogeneous transform (Rodrigues' formula); exact for multiples of 90 degrees.
+        Homogeneous transform (Rodrigues' formula), in the unit of `point`; exact for multiples of
+        90 degrees.
     """
     unit = np.asarray(direction, dtype=float)
     unit = unit / np.linalg.norm(unit)
@@ -120,5 +145,16 @@ def rotation_about(
 
 
 def parity(cells: NDArray[np.generic]) -> IntArray:
-    """Checkerboard colour, 0 or 1, of each cell of an (n, 3) integer array, shape (n,)."""
+    """Checkerboard colour of cells.
+
+    Parameters
+    ----------
+    cells : (..., 3) int array
+        Lattice coordinates.
+
+    Returns
+    -------
+    (...) int32 array
+        0 or 1 for each cell: the sum of its coordinates modulo 2.
+    """
     return np.asarray(np.asarray(cells, dtype=np.int32).sum(axis=-1) % 2, dtype=np.int32)

@@ -1,4 +1,8 @@
-"""Whether two segments of a plane come near each other while one of them turns a quarter."""
+"""How near two segments of a plane come while one of them turns a quarter.
+
+Axes of hinge barrels and link plates are such segments: :mod:`fabfold.lattice.sweep` and
+:mod:`fabfold.lattice.plate_sweep` look for what meets in a turn about a lattice edge.
+"""
 
 # mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
 
@@ -7,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["INSET", "LEAST", "point_distance", "segments_meet"]
+__all__ = ["INSET", "LEAST", "segment_distance", "segments_meet"]
 
 #: How far a barrel's inner axis stands back from each end of its lattice edge, and how near two
 #: inner axes may come, in voxel sides: for a barrel radius of 1/8 of the voxel and a clearance of
@@ -16,8 +20,8 @@ INSET = LEAST = 0.265
 
 
 @njit(cache=True)
-def point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Distance of a point from a segment."""
+def _point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Distance of the point p from the segment from a to b."""
     dx = bx - ax
     dy = by - ay
     length = dx * dx + dy * dy
@@ -25,6 +29,32 @@ def point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: fl
     if length > 0.0:
         share = min(1.0, max(0.0, ((px - ax) * dx + (py - ay) * dy) / length))
     return np.hypot(px - ax - share * dx, py - ay - share * dy)
+
+
+@njit(cache=True)
+def segment_distance(
+    ax: float, ay: float, bx: float, by: float, px: float, py: float, qx: float, qy: float
+) -> float:
+    """Distance of two segments that do not cross.
+
+    Parameters
+    ----------
+    ax, ay, bx, by : float
+        Ends a and b of one segment.
+    px, py, qx, qy : float
+        Ends p and q of the other.
+
+    Returns
+    -------
+    float
+        In the unit of the ends.
+    """
+    return min(
+        _point_distance(ax, ay, px, py, qx, qy),
+        _point_distance(bx, by, px, py, qx, qy),
+        _point_distance(px, py, ax, ay, bx, by),
+        _point_distance(qx, qy, ax, ay, bx, by),
+    )
 
 
 @njit(cache=True)
@@ -36,13 +66,21 @@ def segments_meet(
     Parameters
     ----------
     x, y : int
-        Twice the middle of the turning segment: it runs along x where x is odd, along y where y
-        is odd, and is a point where both are even.
+        Twice the middle of the turning segment, voxel sides: it runs along x where x is odd, along
+        y where y is odd, and is a point where both are even.
     half : float
-        Half its length.
-    c, d, other_half
-        The same of the segment that stays.
+        Half its length, voxel sides.
+    c, d : int
+        Twice the middle of the segment that stays, read in the same way.
+    other_half : float
+        Half its length, voxel sides.
     least : float
+        Distance that counts as near, voxel sides.
+
+    Returns
+    -------
+    bool
+        True where they come nearer at some angle.
     """
     mx = half if x % 2 != 0 else 0.0
     my = half if y % 2 != 0 else 0.0
@@ -61,12 +99,7 @@ def segments_meet(
         ay = (0.5 * x - mx) * sine + (0.5 * y - my) * cosine
         bx = (0.5 * x + mx) * cosine - (0.5 * y + my) * sine
         by = (0.5 * x + mx) * sine + (0.5 * y + my) * cosine
-        away = min(
-            point_distance(ax, ay, px, py, qx, qy),
-            point_distance(bx, by, px, py, qx, qy),
-            point_distance(px, py, ax, ay, bx, by),
-            point_distance(qx, qy, ax, ay, bx, by),
-        )
+        away = segment_distance(ax, ay, bx, by, px, py, qx, qy)
         if away < least:  # segments that cross have been near before
             return True
         if angle >= 0.5 * np.pi:

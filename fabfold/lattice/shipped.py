@@ -20,17 +20,40 @@ _BOX = re.compile(r"box-(\d+)x(\d+)x(\d+)")
 
 
 def templates_folder() -> Path:
-    """Folder that holds the template files, in a checkout as in an installed wheel."""
+    """Folder that holds the template files.
+
+    Returns
+    -------
+    Path
+        In a checkout, or in an installed wheel.
+    """
     return data_folder("templates")
 
 
 def template_names() -> list[str]:
-    """Names of the templates that come as files; boxes of any size need no file."""
+    """Names of the templates that come as files; boxes of any size need no file.
+
+    Returns
+    -------
+    list of str
+        Sorted.
+    """
     return sorted(path.stem for path in templates_folder().glob("*.toml"))
 
 
 def describe(name: str) -> str:
-    """What a shipped template says of itself."""
+    """What a shipped template says of itself.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`template_names`.
+
+    Returns
+    -------
+    str
+        The description in its file; empty where it has none.
+    """
     text = (templates_folder() / f"{name}.toml").read_text(encoding="utf-8")
     return str(tomllib.loads(text).get("description", ""))
 
@@ -40,6 +63,16 @@ def load_template(name: str) -> Template:
 
     The format of a file is described in :mod:`fabfold.lattice.template_files`. A mesh as the target
     is :func:`fabfold.voxels.mesh_template.template_of_solid`.
+
+    Parameters
+    ----------
+    name : str
+        Name, or path of a ``.toml`` file.
+
+    Returns
+    -------
+    Template
+        The same object for the same name; a file is read at every call.
 
     Raises
     ------

@@ -1,15 +1,16 @@
-"""Cells that a unit cube sweeps while it turns 90° about an edge of the lattice.
+"""What a unit cube and a hinge barrel meet in a quarter turn about an edge of the lattice.
 
-A cube that turns about a lattice edge keeps its layer along the axis, so the question is a plane
-one: which unit squares does a unit square sweep (open interiors) while it turns a quarter about
-a lattice point? Take the point as origin and let square ``(a, b)`` be ``[a, a + 1] x [b, b + 1]``.
+The planner of the folding stage looks collisions up in these tables. A cube that turns about a
+lattice edge keeps its layer along the axis, so the question is a plane one: which unit squares does
+a unit square sweep (open interiors) while it turns a quarter about a lattice point? Take the point
+as origin and let square ``(a, b)`` be ``[a, a + 1] x [b, b + 1]``.
 
 Every square lies in one quadrant, and a circle about the origin meets it in one arc. A square that
 starts in the first quadrant and turns counter-clockwise sweeps, on the circle of radius ``r``, all
 angles from the start of its arc to the end of its arc plus 90°. So it hits a square of the first
 quadrant where, at some radius they share, that square's arc ends after its own begins; it hits a
-square of the second quadrant where, at some radius they share, its own arc ends after that
-square's arc, turned back by 90°, begins. All other quarters and the other sense are mirror images.
+square of the second quadrant where, at some radius they share, its own arc ends after that square's
+arc, turned back by 90°, begins. All other quarters and the other sense are mirror images.
 
 The arcs' ends are compared through ``r²``, and every threshold is an integer: looking once between
 each two neighbouring integers decides the question exactly.
@@ -41,7 +42,17 @@ __all__ = ["SweepTable", "arcs_overlap", "sweep_table", "with_plates"]
 def arcs_overlap(a: int, b: int, c: int, d: int) -> bool:
     """Whether, at some radius, the arc of square (c, d) ends after the arc of (a, b) begins.
 
-    All four numbers are at least 0: both squares lie in the first quadrant.
+    Parameters
+    ----------
+    a, b : int
+        Lower corner of a square of the first quadrant.
+    c, d : int
+        Lower corner of another one.
+
+    Returns
+    -------
+    bool
+        True where a turning square ``(c, d)`` hits ``(a, b)``, see the module's text.
     """
     low = max(a * a + b * b, c * c + d * d)
     high = min((a + 1) ** 2 + (b + 1) ** 2, (c + 1) ** 2 + (d + 1) ** 2)
@@ -70,10 +81,12 @@ class SweepTable(NamedTuple):
     side : int
         Squares ``(a, b)`` with ``0 <= a, b < side`` are in the table.
     start : (side * side + 1,) int32 array
+        Where the squares that each square sweeps begin in `cells`:
         ``cells[start[a * side + b] : start[a * side + b + 1]]`` belongs to square ``(a, b)``.
     cells : (k, 2) int16 array
         The squares swept, without the square itself.
     edge_start : (4 * side * side + 1,) int32 array
+        Where the barrels that each barrel meets begin in `edges`:
         ``edges[edge_start[i] : edge_start[i + 1]]`` with ``i = x * 2 * side + y`` belongs to the
         lattice edge whose middle is at ``(x, y) / 2``, x > 0 and y >= 0. Two even numbers: an edge
         along the axis; x odd: an edge along x; y odd: along y.
@@ -93,6 +106,7 @@ class SweepTable(NamedTuple):
 
 @njit(cache=True)
 def _fill(side: int, start: NDArray[np.int32], cells: NDArray[np.int16], write: bool) -> None:
+    """Fill ``SweepTable.start`` and, where `write` is set, ``SweepTable.cells``."""
     count = 0
     for a in range(side):
         for b in range(side):
@@ -176,9 +190,15 @@ def sweep_table(reach: int, *, halves: bool = False) -> SweepTable:
     Parameters
     ----------
     reach : int
+        Greatest distance from the axis along x and y, in cells.
     halves : bool
         The lattice is one of half cells: barrels are two edges long, and the two ends of an edge
         cannot be told apart, so that only barrels that really cross or coincide count as meeting.
+
+    Returns
+    -------
+    SweepTable
+        Without link plates, see :func:`with_plates`.
     """
     side = 16
     while side < reach:
@@ -187,7 +207,20 @@ def sweep_table(reach: int, *, halves: bool = False) -> SweepTable:
 
 
 def with_plates(table: SweepTable, *, halves: bool = False) -> SweepTable:
-    """The same table with what link plates meet; they are made once a side as well."""
+    """The same table with what link plates meet; made once for each side as well.
+
+    Parameters
+    ----------
+    table : SweepTable
+        From :func:`sweep_table`.
+    halves : bool
+        As of :func:`sweep_table`.
+
+    Returns
+    -------
+    SweepTable
+        With ``plates``.
+    """
     return table._replace(plates=_plates(table.side, halves))
 
 

@@ -1,4 +1,8 @@
-"""Target shapes: cells of the lattice, and the creases along which a filled one folds again."""
+"""Target shapes that a model folds into.
+
+A :class:`Template` is a set of lattice cells. It may have creases, along which it is folded once
+more when it is filled.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import TemplateError
-from fabfold.lattice.rotations import IntArray, parity
+from fabfold.lattice.rotations import FACES, IntArray, parity
 
 __all__ = ["MAX_CELLS", "MAX_SIDE", "Crease", "Template"]
 
@@ -23,11 +27,12 @@ class Crease:
 
     Attributes
     ----------
-    start, end : three int
+    start, end : tuple of 3 int
         Corners of cells, between which the line runs: the corner ``(i, j, k)`` is the point
         ``(i, j, k) - 0.5`` of the lattice.
     angle_deg : int
-        Right-handed about the direction from `start` to `end`: 90, 180, -90 or -180.
+        Right-handed fold angle about the direction from `start` to `end`: 90, 180, -90 or -180
+        degrees.
     moves : (k, 3) int32 array
         The cells that turn, as the template lies before any fold.
     """
@@ -38,7 +43,18 @@ class Crease:
     moves: IntArray
 
     def shifted(self, by: NDArray[np.integer]) -> Crease:
-        """The same crease moved by whole cells."""
+        """The same crease moved by whole cells.
+
+        Parameters
+        ----------
+        by : (3,) int array
+            Cells along x, y and z.
+
+        Returns
+        -------
+        Crease
+            With line and cells moved.
+        """
         x, y, z = (int(value) for value in by)
         return Crease(
             (self.start[0] + x, self.start[1] + y, self.start[2] + z),
@@ -62,7 +78,13 @@ class Template:
         Folds that the filled template makes in the end, in this order; most have none. See
         :mod:`fabfold.lattice.creases`.
     joints : str
-        ``"any"``, or ``"inside"`` where no hinge may lie on the surface of the folded shape.
+        Where hinges may lie: ``"any"``, or ``"inside"`` where none may lie on the surface of the
+        folded shape.
+
+    Raises
+    ------
+    TemplateError
+        If there is no cell.
     """
 
     name: str
@@ -107,7 +129,8 @@ class Template:
         Returns
         -------
         (2 x + 1, 2 y + 1, 2 z + 1) bool array
-            By twice the middle of the edge, plus 1.
+            Whether each edge lies inside, indexed by twice its middle plus 1, where x, y and z are
+            the sides of the bounding box in cells.
         """
         near = self.occupancy(pad=1)
         inside = np.zeros(2 * np.array(self.shape) + 1, dtype=bool)
@@ -124,7 +147,29 @@ class Template:
         return inside
 
     def occupancy(self, pad: int = 0) -> NDArray[np.bool_]:
-        """Boolean grid of the cells with `pad` empty cells on every side."""
+        """Grid of the bounding box that tells which cells there are.
+
+        Parameters
+        ----------
+        pad : int
+            Empty cells added on every side.
+
+        Returns
+        -------
+        (x + 2 pad, y + 2 pad, z + 2 pad) bool array
+            True for cells of the template.
+        """
         grid = np.zeros(np.array(self.shape) + 2 * pad, dtype=bool)
         grid[tuple((self.cells + pad).T)] = True
         return grid
+
+    def outer_faces(self) -> NDArray[np.bool_]:
+        """Which faces of the cells lie on the outside.
+
+        Returns
+        -------
+        (m, 6) bool array
+            For each cell, and each face in the order of :data:`fabfold.lattice.rotations.FACES`.
+        """
+        grid = self.occupancy(pad=1)
+        return np.stack([~grid[tuple((self.cells + 1 + d).T)] for d in FACES], axis=1)

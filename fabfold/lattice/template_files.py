@@ -39,16 +39,18 @@ def read_template(path: Path) -> Template:
     Parameters
     ----------
     path : Path
+        A ``.toml`` file.
 
     Returns
     -------
     Template
-        In one piece; its creases join its parts to a tree and turn without collision.
+        In one piece; its creases join its parts to a tree, and no two cells end in one place.
 
     Raises
     ------
     TemplateError
-        Naming the file, and the line or the field that is wrong.
+        If the file cannot be used. The message names the file, and the line or the field that is
+        wrong.
     """
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -71,28 +73,28 @@ def _template(data: dict[str, Any], stem: str) -> Template:
     name = data.get("name", stem)
     if not isinstance(name, str) or not name.strip():
         raise ValueError("name: wants a text that is not empty")
-    ways = [key for key in ("cells", "layers", "box") if key in data]
-    if len(ways) != 1:
+    given = [key for key in ("cells", "layers", "box") if key in data]
+    if len(given) != 1:
         raise ValueError(
             "wants a name and one of cells, layers or [[box]], "
-            + (f"found {' and '.join(ways)}" if ways else "found none")
+            + (f"found {' and '.join(given)}" if given else "found none")
         )
-    if "remove" in data and ways != ["box"]:
-        raise ValueError(f"remove: goes with [[box]], not with {ways[0]}")
-    read = {"cells": _from_cells, "layers": _from_layers, "box": _from_boxes}[ways[0]]
+    if "remove" in data and given != ["box"]:
+        raise ValueError(f"remove: goes with [[box]], not with {given[0]}")
+    read = {"cells": _from_cells, "layers": _from_layers, "box": _from_boxes}[given[0]]
     cells = read(data)
     if len(cells) == 0:
-        raise ValueError(f"{ways[0]}: there is no cell")
+        raise ValueError(f"{given[0]}: there is no cell")
     if len(cells) > MAX_CELLS or np.ptp(cells, axis=0).max() >= MAX_SIDE:
         raise ValueError(
-            f"{ways[0]}: {len(cells)} cells, {np.ptp(cells, axis=0).max() + 1} along an axis; at "
+            f"{given[0]}: {len(cells)} cells, {np.ptp(cells, axis=0).max() + 1} along an axis; at "
             f"most {MAX_CELLS} and {MAX_SIDE} are possible"
         )
     pieces = pieces_of(cells)
     if len(pieces) > 1:
         stray = cells[pieces[-1][0]].tolist()
         raise ValueError(
-            f"{ways[0]}: the cells are in {len(pieces)} pieces of "
+            f"{given[0]}: the cells are in {len(pieces)} pieces of "
             f"{', '.join(str(len(piece)) for piece in pieces)} cells that share no face; the "
             f"smallest has cell {stray}"
         )
@@ -104,7 +106,18 @@ def _template(data: dict[str, Any], stem: str) -> Template:
 
 
 def pieces_of(cells: IntArray) -> list[list[int]]:
-    """Groups of cells that hang together through faces, as indices, largest first."""
+    """Groups of cells that hang together through faces.
+
+    Parameters
+    ----------
+    cells : (m, 3) int32 array
+        Lattice coordinates.
+
+    Returns
+    -------
+    list of list of int
+        Indices of `cells`, the largest group first.
+    """
     index = {tuple(cell): i for i, cell in enumerate(cells.tolist())}
     seen: set[int] = set()
     pieces = []

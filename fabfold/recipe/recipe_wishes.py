@@ -9,7 +9,8 @@ from fabfold.recipe.recipe import Recipe
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.regions import parse_keep, parse_region, sample_region, sample_surface
 from fabfold.tree.problem import Weights
-from fabfold.wishes.terms import Keep, Wishes
+from fabfold.wishes.keep import Keep
+from fabfold.wishes.wish_list import Wishes
 
 __all__ = ["make_wishes", "weights_of", "wished"]
 

@@ -28,12 +28,13 @@ from fabfold.search.saved import SeedCache
 from fabfold.search.seeds import Event, Job, SeedResult
 from fabfold.store import StageStore, stage_key
 from fabfold.tree.effort import EFFORTS
-from fabfold.tree.parts import parted
 from fabfold.tree.problem import from_features
 from fabfold.tree.solve import Candidate
+from fabfold.tree.template_parts import restrict_to_parts
 from fabfold.voxels.features import features
 from fabfold.voxels.voxel_model import Voxels
-from fabfold.wishes.terms import Wishes, rank_by_cuts, uncut_pairs
+from fabfold.wishes.protect import rank_by_cuts, rigid_pairs
+from fabfold.wishes.wish_list import Wishes
 
 __all__ = ["Rounds", "search_order"]
 
@@ -86,7 +87,7 @@ def _usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> li
     ordered = search_order(options)
     if wishes.regions:
         found = [(voxels, features(voxels)) for voxels in ordered]
-        ordered = [ordered[index] for index in rank_by_cuts(wishes, found, template)]
+        ordered = [ordered[index] for index in rank_by_cuts(wishes.regions, found, template)]
     return ordered
 
 
@@ -344,21 +345,21 @@ class Rounds:
     def _job_of(self, seed: int) -> Job | SeedResult:
         voxels = self.voxels(seed)
         joints = features(voxels)
-        uncut = self.wishes.uncut(voxels, joints, self.template)
+        protected = self.wishes.protected(voxels, joints, self.template)
         try:
             problem = from_features(
                 voxels,
                 joints,
                 self.template,
                 weights_of(self.recipe),
-                bias=self.wishes.bias(voxels, self.template),
-                stiff=uncut_pairs(uncut, joints),
+                extra_cost=self.wishes.extra_cost(voxels, self.template),
+                always_rigid=rigid_pairs(protected, joints),
                 joints=self.recipe.joints,
                 share=self.recipe.share,
             )
-            problem = self.wishes.apply(problem, voxels, self.template)
+            problem = self.wishes.with_roots(problem, voxels, self.template)
             if self.template.creases:
-                problem = parted(problem, seed, joints.depth)
+                problem = restrict_to_parts(problem, seed, joints.depth)
         except NoTreeError as error:
             return SeedResult((), fits=False, why=str(error))
         return Job(problem, LatticeFoldability(), EFFORTS[self.recipe.effort])

@@ -44,4 +44,4 @@ def warm_up_job(joints: JointSet = "S") -> Job:
         double=np.ones(count, np.bool_),
         joints=joints,
     )
-    return Job(strip, LatticeFoldability(), replace(EFFORTS["quick"], restarts=2, polishing=20))
+    return Job(strip, LatticeFoldability(), replace(EFFORTS["quick"], restarts=2, polish_best=20))

@@ -1,4 +1,10 @@
-"""From poses to a :class:`~fabfold.tree.system.HingeSystem` and a finished tree."""
+"""From poses to trees: the choice of hinges, the hinge system, and the finished tree.
+
+:func:`hinge_choice` finds the hinges that could join the rigid clusters of a set of poses,
+:meth:`HingeChoice.tree` draws a spanning tree of them with its
+:class:`~fabfold.tree.system.HingeSystem`, and :func:`fold_tree` makes the
+:class:`~fabfold.tree.fold_tree.FoldTree` of the result.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +15,11 @@ from numpy.typing import NDArray
 
 from fabfold.lattice.rotations import ROTATIONS
 from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
-from fabfold.tree.grow import doubles_needed, energy_of
+from fabfold.tree.pose_energy import doubles_needed, energy_of
+from fabfold.tree.possible_hinges import HINGE_ROW, HingeRows, find_hinges, max_hinge_rows
 from fabfold.tree.problem import TreeProblem
-from fabfold.tree.rebuild import COLUMNS, candidates, hinge_rows, rooted, spanning_tree
 from fabfold.tree.sharing import shared_octants, unpacked
+from fabfold.tree.spanning_trees import root_tree, spanning_tree
 from fabfold.tree.swept_cells import hinge_tables
 from fabfold.tree.system import HingeSystem
 
@@ -36,7 +43,7 @@ class SpanningTree:
     joints: NDArray[np.int32]
 
     @property
-    def keys(self) -> set[tuple[int, int]]:
+    def hinged_pairs(self) -> set[tuple[int, int]]:
         """Voxel pairs that carry a hinge, smaller voxel first."""
         return {(min(a, b), max(a, b)) for a, b in self.joints[:, :2].tolist()}
 
@@ -48,11 +55,13 @@ class HingeChoice:
     Attributes
     ----------
     problem : TreeProblem
+        Voxels, joints and template.
     label : (n,) int32 array
         Cluster of each voxel.
     clusters : int
-    found : (k, 24) int32 array
-        Possible hinges, see :func:`fabfold.tree.rebuild.candidates`.
+        Number of rigid clusters.
+    rows : (k,) array of :data:`fabfold.tree.possible_hinges.HINGE_ROW`
+        Possible hinges.
     octants : (n,) uint8 array or None
         See :func:`fabfold.tree.sharing.shared_octants`.
     """
@@ -60,32 +69,59 @@ class HingeChoice:
     problem: TreeProblem
     label: NDArray[np.int32]
     clusters: int
-    found: NDArray[np.int32]
+    rows: HingeRows
     octants: NDArray[np.uint8] | None = None
 
-    def wanted(self, keys: set[tuple[int, int]], bonus: float) -> NDArray[np.float64]:
-        """Preference (smaller is sooner) for hinges between the voxel pairs of `keys`."""
-        wanted = np.zeros(len(self.found))
-        for row, (u, v) in enumerate(self.found[:, :2].tolist()):
-            if (u, v) in keys or (v, u) in keys:
-                wanted[row] = -bonus
-        return wanted
+    def preference(self, pairs: set[tuple[int, int]], bonus: float) -> NDArray[np.float64]:
+        """Preference for hinges between some pairs of voxels.
+
+        Parameters
+        ----------
+        pairs : set of (int, int)
+            Pairs of voxels, in either order.
+        bonus : float
+            How much sooner their hinges are tried, against a uniform(0, 1).
+
+        Returns
+        -------
+        (k,) float64 array
+            For each possible hinge; smaller is sooner.
+        """
+        preference = np.zeros(len(self.rows))
+        ends = zip(self.rows["u"].tolist(), self.rows["v"].tolist(), strict=True)
+        for row, (u, v) in enumerate(ends):
+            if (u, v) in pairs or (v, u) in pairs:
+                preference[row] = -bonus
+        return preference
 
     def tree(
-        self, wanted: NDArray[np.float64], generator: NDArray[np.uint64]
+        self, preference: NDArray[np.float64], generator: NDArray[np.uint64]
     ) -> SpanningTree | None:
-        """One random spanning tree, or None where the hinges do not join all the clusters."""
+        """Draw one random spanning tree.
+
+        Parameters
+        ----------
+        preference : (k,) float64 array
+            From :meth:`preference`.
+        generator : (1,) uint64 array
+            Random state, advanced.
+
+        Returns
+        -------
+        SpanningTree or None
+            None where the hinges drawn do not join all the clusters.
+        """
         chosen = np.empty(self.clusters - 1, np.int32)
-        left = spanning_tree(self.found, len(self.found), self.clusters, wanted, generator, chosen)
+        left = spanning_tree(self.rows, self.clusters, preference, generator, chosen)
         if left > 1:
             return None
-        hinges = self.clusters - 1 + int(self.found[chosen, 13].sum())
+        hinges = self.clusters - 1 + int(self.rows["double"][chosen].sum())
         body = np.empty(len(self.label), np.int32)
         parent, joints = np.empty(hinges, np.int32), np.empty((hinges, 3), np.int32)
         point2 = np.empty((hinges, 3), np.int32)
         axis, turns = np.empty(hinges, np.int8), np.empty(hinges, np.int8)
-        rooted(
-            self.problem.tables, self.found, chosen, self.label, self.clusters, hinge_tables(),
+        root_tree(
+            self.problem.tables, self.rows, chosen, self.label, self.clusters, hinge_tables(),
             body, parent, point2, axis, turns, joints,
         )  # fmt: skip
         system = HingeSystem(
@@ -101,17 +137,30 @@ class HingeChoice:
 
 
 def hinge_choice(problem: TreeProblem, pose: NDArray[np.int32]) -> HingeChoice:
-    """Clusters and possible hinges of a full set of poses."""
+    """Clusters and possible hinges of a full set of poses.
+
+    Parameters
+    ----------
+    problem : TreeProblem
+        Voxels, joints and template.
+    pose : (n,) int32 array
+        ``24 * template cell + rotation`` of each voxel.
+
+    Returns
+    -------
+    HingeChoice
+        What spanning trees are drawn from.
+    """
     label = np.empty(len(problem), np.int32)
-    found = np.empty((hinge_rows(problem.tables), COLUMNS), np.int32)
-    total, rows = candidates(problem.tables, pose, hinge_tables(), label, found)
-    return HingeChoice(problem, label, total, found[:rows], _octants(problem, pose))
+    rows = np.empty(max_hinge_rows(problem.tables), HINGE_ROW)
+    clusters, count = find_hinges(problem.tables, pose, hinge_tables(), label, rows)
+    return HingeChoice(problem, label, clusters, rows[:count], _octants(problem, pose))
 
 
 def _octants(problem: TreeProblem, pose: NDArray[np.int32]) -> NDArray[np.uint8] | None:
-    if problem.tables.shares == 0:
+    if problem.tables.max_shared == 0:
         return None
-    return shared_octants(pose, problem.tables.mask[:, 0])
+    return shared_octants(pose, problem.tables.octant_mask[:, 0])
 
 
 def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree) -> FoldTree:
@@ -120,13 +169,16 @@ def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree)
     Parameters
     ----------
     problem : TreeProblem
+        Voxels, joints and template.
     pose : (n,) int32 array
         ``24 * template cell + rotation`` of each voxel.
     tree : SpanningTree
+        A spanning tree of the poses' clusters.
 
     Returns
     -------
     FoldTree
+        With the energies of the poses and the tree.
     """
     system = tree.system
     target = problem.template.cells[pose // 24].astype(np.int32)
@@ -159,13 +211,13 @@ def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree)
     total, clusters = energy_of(problem.tables, pose, problem.empty_face)
     weights = problem.weights
     least = weights.single * (clusters - 1)
-    if problem.tables.single + 1 < len(problem.joints):
+    if problem.tables.last_single + 1 < len(problem.joints):
         least += (weights.double - weights.single) * int(doubles_needed(problem.tables, pose))
     singles = sum(edge.kind == "S" for edge in edges)
     count = weights.single * singles + weights.double * len(links)
-    total += count - least  # a hinge that cannot turn may have made a double one needful
+    total += count - least  # a hinge that cannot turn may have made a double one necessary
     weight = weights.surface
-    wished = problem.wished(pose)
+    extra = problem.extra_energy(pose)
     return FoldTree(
         template=problem.template,
         source=problem.source,
@@ -178,10 +230,10 @@ def fold_tree(problem: TreeProblem, pose: NDArray[np.int32], tree: SpanningTree)
         root_rotation=root.astype(np.int32),
         root_translation=(target[first] - root @ problem.source[first]).astype(np.int32),
         energy={
-            "surface": float((total - count - wished) / weight) if weight else 0.0,
+            "surface": float((total - count - extra) / weight) if weight else 0.0,
             "count": float(count),
             "total": float(total),
-            **({} if problem.bias is None else {"wishes": wished}),
+            **({} if problem.extra_cost is None else {"wishes": extra}),
         },
         octants=_octants(problem, pose),
     )
@@ -217,7 +269,7 @@ def _rigid_edges(
                 v = int(tables.neighbour[u, face])
                 if v < 0 or seen[v] or not tables.allowed[u, face, 0] or body[v] != body[u]:
                     continue
-                if tables.step[face, 0, pose[u]] == pose[v]:
+                if tables.child_pose[face, 0, pose[u]] == pose[v]:
                     seen[v] = True
                     queue.append(v)
                     edges.append(Edge(u, v, "R"))

@@ -23,11 +23,11 @@ __all__ = [
     "JointSet",
     "double_joints",
     "edge_sides",
+    "edge_turn",
     "face_transforms",
-    "joint_rows",
+    "joint_types",
+    "realizations",
     "single_joints",
-    "turn",
-    "ways",
 ]
 
 JointSet = Literal["S", "S90", "S+D", "all"]
@@ -43,7 +43,7 @@ class Joint:
     Attributes
     ----------
     kind : str
-        ``"R"``, ``"S"`` or ``"D"``.
+        ``"R"`` rigid, ``"S"`` single hinge, or ``"D"`` double hinge.
     face : int
         Face of the parent that the child stands on, index in
         :data:`fabfold.lattice.rotations.FACES`.
@@ -71,18 +71,37 @@ def edge_sides(face: int) -> tuple[int, int, int, int]:
     """The 4 in-plane directions of a face, as indices of ``FACES`` in ascending order.
 
     Edge ``k`` of the face is the one towards ``FACES[edge_sides(face)[k]]``.
+
+    Parameters
+    ----------
+    face : int
+        Index in :data:`fabfold.lattice.rotations.FACES`.
+
+    Returns
+    -------
+    tuple of 4 int
+        Indices in ``FACES``.
     """
     first, second, third, fourth = (f for f in range(6) if f >> 1 != face >> 1)
     return (first, second, third, fourth)
 
 
-def turn(face: int, side: int, quarters: int) -> NDArray[np.float64]:
-    """Transform of a turn about edge `side` (0 to 3) of `face` of the cell at the origin.
+def edge_turn(face: int, side: int, quarters: int) -> NDArray[np.float64]:
+    """Transform of a turn about an edge of the cell at the origin.
+
+    Parameters
+    ----------
+    face : int
+        Face of the cell, index in :data:`fabfold.lattice.rotations.FACES`.
+    side : int
+        Edge of the face, 0 to 3, see :func:`edge_sides`.
+    quarters : int
+        Quarter turns; a positive number opens the face.
 
     Returns
     -------
     (4, 4) float64 array
-        Homogeneous transform in the parent's frame.
+        Homogeneous transform in the parent's frame, lattice units.
     """
     d = FACES[face]
     n = FACES[edge_sides(face)[side]]
@@ -90,6 +109,7 @@ def turn(face: int, side: int, quarters: int) -> NDArray[np.float64]:
 
 
 def _landing(face: int, transform: NDArray[np.float64]) -> tuple[tuple[int, int, int], int]:
+    """Cell and rotation that a transform gives the cell beside `face`."""
     moved = np.rint(transform[:3, :3] @ FACES[face] + transform[:3, 3]).astype(int)
     x, y, z = moved.tolist()
     return (x, y, z), rotation_index(transform[:3, :3])
@@ -101,13 +121,23 @@ def face_transforms(face: int) -> tuple[Joint, ...]:
 
     There are 97: the rigid one, 12 of one axis (4 of them, the turns of 270 degrees, put the child
     on its own parent) and 84 that need two real turns.
+
+    Parameters
+    ----------
+    face : int
+        Index in :data:`fabfold.lattice.rotations.FACES`.
+
+    Returns
+    -------
+    tuple of Joint
+        One joint for each transform.
     """
     found: dict[tuple[tuple[int, int, int], int], Joint] = {}
     cell, rotation = _landing(face, np.eye(4))
     found[cell, rotation] = Joint("R", face, (), (), cell, rotation)
     for side in range(4):
         for quarters in (1, 2, 3):
-            cell, rotation = _landing(face, turn(face, side, quarters))
+            cell, rotation = _landing(face, edge_turn(face, side, quarters))
             joint = Joint("S", face, (side,), (quarters,), cell, rotation)
             found.setdefault((cell, rotation), joint)
     for first in range(4):
@@ -115,7 +145,7 @@ def face_transforms(face: int) -> tuple[Joint, ...]:
             for q1 in (1, 2, 3):
                 for q2 in (1, 2, 3):
                     # Axis 2 rides on the link, hence stands on the right.
-                    transform = turn(face, first, q1) @ turn(face, second, q2)
+                    transform = edge_turn(face, first, q1) @ edge_turn(face, second, q2)
                     cell, rotation = _landing(face, transform)
                     joint = Joint("D", face, (first, second), (q1, q2), cell, rotation)
                     found.setdefault((cell, rotation), joint)
@@ -124,13 +154,39 @@ def face_transforms(face: int) -> tuple[Joint, ...]:
 
 @cache
 def single_joints(face: int, quarters: int = 2) -> tuple[Joint, ...]:
-    """The 4 single hinges of a face with the given turn, in the order of :func:`edge_sides`."""
+    """The 4 single hinges of a face with the given turn.
+
+    Parameters
+    ----------
+    face : int
+        Index in :data:`fabfold.lattice.rotations.FACES`.
+    quarters : int
+        Quarter turns of the hinge, 1 to 3.
+
+    Returns
+    -------
+    tuple of 4 Joint
+        In the order of :func:`edge_sides`.
+    """
     return tuple(j for j in face_transforms(face) if j.kind == "S" and j.turns == (quarters,))
 
 
 @cache
 def double_joints(face: int, neighbours_only: bool = True) -> tuple[Joint, ...]:
-    """The double hinges of a face: 84, or the 32 that land on a face neighbour of the parent."""
+    """The double hinges of a face.
+
+    Parameters
+    ----------
+    face : int
+        Index in :data:`fabfold.lattice.rotations.FACES`.
+    neighbours_only : bool
+        Whether the child must land on a face neighbour of the parent.
+
+    Returns
+    -------
+    tuple of Joint
+        The 32 that do, or all 84.
+    """
     return tuple(
         j
         for j in face_transforms(face)
@@ -139,21 +195,22 @@ def double_joints(face: int, neighbours_only: bool = True) -> tuple[Joint, ...]:
 
 
 @cache
-def ways(joint: Joint) -> tuple[tuple[int, int, int, int], ...]:
+def realizations(joint: Joint) -> tuple[tuple[int, int, int, int], ...]:
     """Every hinge that makes the transform of a joint, simplest first.
 
     Two axes on one edge turn like a single hinge and are left out. 24 of the 84 double hinges have
-    two ways: opposite turns about two neighbouring edges, for one, come to the same.
+    two realizations: opposite turns about two neighbouring edges, for one, come to the same.
 
     Parameters
     ----------
     joint : Joint
+        A joint type.
 
     Returns
     -------
     tuple of (side, turns, side, turns)
-        The two axes of each way, parent's first; the second side is -1 for a single hinge. A
-        rigid joint has no way.
+        Side and quarter turns of both axes, parent's first; the second side is -1 for a single
+        hinge. A rigid joint has none.
     """
     if joint.kind == "R":
         return ()
@@ -166,20 +223,27 @@ def ways(joint: Joint) -> tuple[tuple[int, int, int, int], ...]:
         for q1 in (1, 2, 3)
         for q2 in (1, 2, 3)
         if first != second
-        and _landing(joint.face, turn(joint.face, first, q1) @ turn(joint.face, second, q2))
+        and _landing(
+            joint.face, edge_turn(joint.face, first, q1) @ edge_turn(joint.face, second, q2)
+        )
         == (joint.offset, joint.rotation)
     ]
-    return tuple(sorted(found, key=lambda way: (way[1] + way[3], way)))
+    return tuple(sorted(found, key=lambda row: (row[1] + row[3], row)))
 
 
 @cache
-def joint_rows(joints: JointSet) -> tuple[tuple[Joint, ...], ...]:
+def joint_types(joints: JointSet) -> tuple[tuple[Joint, ...], ...]:
     """Joint types of a search by index, one for each face: rigid, half turns, then the others.
 
     Parameters
     ----------
     joints : str
         One of :data:`JOINT_SETS`.
+
+    Returns
+    -------
+    tuple of tuples of 6 Joint
+        One row for each joint type, one joint for each face of the parent.
     """
     by_face = []
     for face in range(6):

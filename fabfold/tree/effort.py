@@ -1,4 +1,7 @@
-"""How long the tree search may try, in counts and never in seconds."""
+"""How long the tree search may try.
+
+Budgets are counts and never seconds, so that the same effort finds the same trees on any machine.
+"""
 
 from __future__ import annotations
 
@@ -13,66 +16,66 @@ class Effort:
 
     Attributes
     ----------
-    beam : int
-        States kept while growing.
-    roots : int
+    beam_width : int
+        States that the beam keeps while poses are grown.
+    root_poses : int
         Root poses tried before growing is given up.
     restarts : int
-        Fresh starts of the folding phase while none folds; then another seed, with another
-        voxelization, is worth more.
-    removals : int
-        Large-neighbourhood moves, per start, until hinges that can turn join all the clusters.
-    closing : int
-        Candidates judged per start and voxel until the closure test passes (phase A).
-    looking : int
-        Looks of the planner per start and voxel until a tree folds (phase A).
-    gathering : int
+        Starts made while none of them folds; then another seed, with another voxelization, is
+        worth more.
+    starts : int
         Starts made in any case, so that the best of several trees that fold is polished.
-    trying : int
-        Candidates judged to lower the energy of each of these.
-    polishing : int
-        The same for the best of them (phase B).
-    least, most : int
-        Voxels taken out at a time.
-    rebeam : int
-        States kept while they are put back.
-    trees : int
+    removals : int
+        Large-neighbourhood steps, per start, until hinges that can turn join all the clusters.
+    closure_tests : int
+        Sets of poses judged by the closure test, per start and voxel, in phase A.
+    planner_runs : int
+        Runs of the planner, per start and voxel, until a tree folds in phase A.
+    polish_each : int
+        Sets of poses judged to lower the energy of each tree that folds.
+    polish_best : int
+        The same for the best of them, in phase B.
+    min_removed, max_removed : int
+        Least and greatest number of voxels taken out at a time.
+    repair_beam_width : int
+        States that the beam keeps while they are put back.
+    spanning_trees : int
         Spanning trees tried for each set of poses.
-    glance : int
-        Planner expansions without progress for a first score.
-    look : int
-        The same, where the first score leaves little to do.
-    strict_look : int
+    short_patience : int
+        Planner expansions without progress after which the first run for a tree ends.
+    long_patience : int
+        The same for the second run in phase A, made where the first leaves little unresolved.
+    polish_patience : int
         The same in phase B, along the steps of the tree that was changed.
-    near : float
-        Share of unresolved planner levels that still counts as little.
-    keep : int
-        Most candidates returned.
+    near_miss : float
+        Greatest share of unresolved quarter turns that counts as little.
+    max_candidates : int
+        Most trees returned.
     """
 
-    beam: int = 10
-    roots: int = 100
+    beam_width: int = 10
+    root_poses: int = 100
     restarts: int = 12
+    starts: int = 20
     removals: int = 30000
-    closing: int = 8
-    looking: int = 1
-    gathering: int = 20
-    trying: int = 400
-    polishing: int = 4000
-    least: int = 4
-    most: int = 16
-    rebeam: int = 6
-    trees: int = 3
-    glance: int = 40
-    look: int = 100
-    strict_look: int = 400
-    near: float = 0.12
-    keep: int = 5
+    closure_tests: int = 8
+    planner_runs: int = 1
+    polish_each: int = 400
+    polish_best: int = 4000
+    min_removed: int = 4
+    max_removed: int = 16
+    repair_beam_width: int = 6
+    spanning_trees: int = 3
+    short_patience: int = 40
+    long_patience: int = 100
+    polish_patience: int = 400
+    near_miss: float = 0.12
+    max_candidates: int = 5
 
 
 #: Effort by name, as the command line offers it.
 EFFORTS: dict[str, Effort] = {
-    "quick": Effort(roots=40, restarts=6, gathering=1, polishing=200),
+    "quick": Effort(root_poses=40, restarts=6, starts=1, polish_best=200),
     "normal": Effort(),
-    "thorough": Effort(roots=400, restarts=60, gathering=30, polishing=20000),
+    "thorough": Effort(root_poses=400, restarts=60, starts=30, polish_best=20000),
 }

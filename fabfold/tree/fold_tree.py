@@ -1,4 +1,8 @@
-"""The joint tree: voxels, edges, bodies, hinges, and ``tree.json``."""
+"""The finished joint tree, and its file ``tree.json``.
+
+A :class:`FoldTree` has the voxels in A and B, the spanning tree of joints between them, and the
+rigid bodies and hinges that follow. All later stages start from it.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,17 @@ __all__ = ["Body", "Edge", "FoldTree", "Hinge"]
 
 @dataclass(frozen=True)
 class Edge:
-    """One edge of the spanning tree of voxels; ``kind`` is ``"R"``, ``"S"`` or ``"D"``."""
+    """One edge of the spanning tree of voxels.
+
+    Attributes
+    ----------
+    parent, child : int
+        The two voxels; they share a face in A.
+    kind : str
+        ``"R"`` rigid, ``"S"`` single hinge or ``"D"`` double hinge.
+    hinges : tuple of int
+        Indices into ``FoldTree.hinges``: none, one or two.
+    """
 
     parent: int
     child: int
@@ -28,7 +42,17 @@ class Edge:
 
 @dataclass(frozen=True)
 class Body:
-    """One rigid body: voxels joined by R edges, or the link plate of the D edge ``edge``."""
+    """One rigid body: voxels joined by R edges, or the link plate of a D edge.
+
+    Attributes
+    ----------
+    name : str
+        Such as ``"body-00"`` or ``"link-00"``.
+    voxels : tuple of int
+        Numbers of its voxels; none for a link plate.
+    edge : int or None
+        For a link plate, the index of its D edge in ``FoldTree.edges``.
+    """
 
     name: str
     voxels: tuple[int, ...]
@@ -41,6 +65,8 @@ class Hinge:
 
     Attributes
     ----------
+    name : str
+        Such as ``"hinge-00"``.
     parent, child : int
         Indices into ``FoldTree.bodies``.
     point : (3,) tuple of float
@@ -48,7 +74,7 @@ class Hinge:
     direction : (3,) tuple of int
         Axis-aligned unit vector.
     angle_deg : float
-        Right-handed fold angle from shape A to shape B.
+        Right-handed fold angle from shape A to shape B, degrees.
     """
 
     name: str
@@ -81,12 +107,14 @@ class FoldTree:
         One a moving axis. Hinge ``i`` carries body ``i + 1``, and its parent comes before it. The
         direction is +x, +y or +z; the sign of the turn is in the angle.
     root_rotation : (3, 3) int32 array
+        Rotation of the whole that carries the folded root body into the template.
     root_translation : (3,) int32 array
-        Rigid motion of the whole that carries the folded root body into the template.
+        Translation after that rotation, lattice units.
     energy : dict of str to float
-        ``surface`` (Eq. 8), ``count`` (Eq. 9) and ``total`` (weighted).
+        ``surface`` (Eq. 8), ``count`` (Eq. 9), ``total`` (weighted), and ``wishes`` where any
+        were made.
     octants : (n,) uint8 array or None
-        Where two voxels share a cell of B: the eighths of its cell in A that each of them keeps to
+        Where two voxels share a cell of B: the octants of its cell in A that each of them keeps to
         (bit ``4 x + 2 y + z``, see :mod:`fabfold.tree.sharing`), 255 for a voxel with a cell of
         its own. None where no voxel shares.
     """
@@ -127,7 +155,7 @@ class FoldTree:
 
         Parameters
         ----------
-        angles_deg : (h,) array
+        angles_deg : (h,) float array
             Angle of every hinge in degrees; zeros are shape A.
 
         Returns
@@ -142,7 +170,20 @@ class FoldTree:
         return poses
 
     def to_json(self, voxel_mm: float, origin_mm: tuple[float, float, float]) -> dict[str, Any]:
-        """The content of ``tree.json`` (format ``fabfold-tree``, version 1)."""
+        """The content of ``tree.json`` (format ``fabfold-tree``, version 1).
+
+        Parameters
+        ----------
+        voxel_mm : float
+            Side of a voxel, mm.
+        origin_mm : tuple of 3 float
+            Centre of the cell (0, 0, 0) of shape A, mm.
+
+        Returns
+        -------
+        dict
+            JSON-ready.
+        """
         names = [body.name for body in self.bodies]
         edges: list[dict[str, Any]] = []
         for edge in self.edges:
@@ -191,6 +232,16 @@ class FoldTree:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> FoldTree:
         """Inverse of :meth:`to_json`.
+
+        Parameters
+        ----------
+        data : mapping
+            The parsed content of a ``tree.json``.
+
+        Returns
+        -------
+        FoldTree
+            As it was written, but for the sizes in mm.
 
         Raises
         ------

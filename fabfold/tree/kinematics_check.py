@@ -20,8 +20,8 @@ __all__ = ["check_tree"]
 def check_tree(tree: FoldTree) -> list[str]:
     """Everything that is wrong with a tree, in words; an empty list when nothing is.
 
-    Checked: distinct cells in A, and in B too but for pairs of voxels in different eighths of one
-    cell, whose hinges are single and lie in their own eighths; target cells in the template; the
+    Checked: distinct cells in A, and in B too but for pairs of voxels in different octants of one
+    cell, whose hinges are single and lie in their own octants; target cells in the template; the
     edges span the voxels and join face neighbours; bodies are exactly the voxels that R edges
     join; hinges in order, on the lattice edge of the face that their voxels share; turns of 90,
     180 or 270 degrees that open the face; a double hinge joins parent, link plate and child in
@@ -32,10 +32,12 @@ def check_tree(tree: FoldTree) -> list[str]:
     Parameters
     ----------
     tree : FoldTree
+        A tree from anywhere: a search, or a file.
 
     Returns
     -------
     list of str
+        One sentence for each fault.
     """
     found = _shapes(tree)
     if found:
@@ -47,7 +49,9 @@ def check_tree(tree: FoldTree) -> list[str]:
     found = _bodies(tree) or _hinges(tree)
     if found:
         return found
-    return _kinematics(tree) + _senses(tree) + _segments(tree) + _plates(tree) + _guests(tree)
+    return (
+        _kinematics(tree) + _senses(tree) + _segments(tree) + _plates(tree) + _sharing_hinges(tree)
+    )
 
 
 def _shapes(tree: FoldTree) -> list[str]:
@@ -74,7 +78,7 @@ def _repeated(cells: NDArray[np.int32]) -> list[tuple[int, ...]]:
 
 def _cells(tree: FoldTree) -> list[str]:
     found = [f"two voxels share source cell {cell}" for cell in _repeated(tree.source)]
-    found += _shared(tree)
+    found += _shared_cells(tree)
     template = {tuple(cell) for cell in tree.template.cells.tolist()}
     found += [
         f"voxel {i}: target cell {tuple(cell)} is outside template {tree.template.name!r}"
@@ -91,7 +95,7 @@ def _corners(tree: FoldTree, voxel: int) -> set[tuple[int, ...]]:
     return {side for k, side in enumerate(sides) if bits >> k & 1}
 
 
-def _shared(tree: FoldTree) -> list[str]:
+def _shared_cells(tree: FoldTree) -> list[str]:
     """Voxels in one cell of B must be two, in different eighths of it."""
     together: dict[tuple[int, ...], list[int]] = {}
     for voxel, cell in enumerate(tree.target.tolist()):
@@ -115,7 +119,7 @@ def _shared(tree: FoldTree) -> list[str]:
     return found
 
 
-def _guests(tree: FoldTree) -> list[str]:
+def _sharing_hinges(tree: FoldTree) -> list[str]:
     """Hinges of voxels that share a cell must lie beside two eighths of theirs."""
     found = []
     for number, edge in enumerate(tree.edges):

@@ -1,4 +1,8 @@
-"""The tree search's input as plain arrays."""
+"""The input of the tree search: voxels, printable joints and template as plain arrays.
+
+:func:`from_features` makes a :class:`TreeProblem` from the voxel stage's results. Its
+:class:`Tables` are what the compiled kernels read.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import NoTreeError
-from fabfold.lattice.rotations import FACES, ROTATION_PRODUCT, ROTATIONS, parity
+from fabfold.lattice.rotations import (
+    FACE_BEFORE,
+    FACES,
+    ROTATION_PRODUCT,
+    ROTATIONS,
+    parity,
+)
 from fabfold.lattice.template import Template
-from fabfold.tree.catalogue import Joint, JointSet, joint_rows, ways
-from fabfold.tree.sharing import WHOLE, beside, most_shared, octant_masks, seen_depths, turned_masks
+from fabfold.tree.catalogue import Joint, JointSet, joint_types, realizations
+from fabfold.tree.sharing import (
+    WHOLE,
+    edge_octants,
+    max_shared_cells,
+    octant_masks,
+    quarter_depths,
+    turned_masks,
+)
 
 if TYPE_CHECKING:
     from fabfold.voxels.features import Features
@@ -33,7 +50,19 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights of the energy (paper section 6)."""
+    """Weights of the energy (paper section 6).
+
+    Attributes
+    ----------
+    surface : float
+        Weight of the surface's energy (Eq. 8), the sum of mean ray depths.
+    rigid : float
+        Weight of a rigid joint.
+    single : float
+        Weight of a single hinge (Eq. 9).
+    double : float
+        Weight of a double hinge (Eq. 9).
+    """
 
     surface: float = 0.3
     rigid: float = 0.0
@@ -52,69 +81,71 @@ class Tables(NamedTuple):
         Voxel across each face, -1 where there is none or no joint is possible.
     allowed : (n, 6, J) bool array
         Whether a joint type can be made there.
-    step : (6, J, 24 m) int32 array
+    child_pose : (6, J, 24 m) int32 array
         Pose of the child from the face, the joint and the parent's pose; -1 outside the template.
-    weight : (J,) float64 array
+    joint_weight : (J,) float64 array
         Energy of each joint type.
-    single : int
-        Joint types 1 to ``single`` are single hinges, those after them double ones.
-    way_start : (6, J + 1) int32 array
-        Joint j of face f is made by the rows ``way_start[f, j]`` to ``way_start[f, j + 1] - 1``
-        of `way`.
-    way : (w, 4) int32 array
-        Side and quarter turns of both axes, see :func:`fabfold.tree.catalogue.ways`.
+    last_single : int
+        Joint types 1 to ``last_single`` are single hinges, those after them double ones.
+    realization_start : (6, J + 1) int32 array
+        Joint j of face f is made by the rows ``realization_start[f, j]`` to
+        ``realization_start[f, j + 1] - 1`` of `realization`.
+    realization : (w, 4) int32 array
+        Side and quarter turns of both axes, see :func:`fabfold.tree.catalogue.realizations`.
     cost : (n, 24 m) float32 array
         Weighted energy of each voxel at each pose: Eq. 8 of the faces that the box shows, and
-        whatever else was asked for (see `bias` of :func:`tree_problem`).
-    centre : (n, m) float32 array
-        Expected `cost` of each voxel in each cell, subtracted while states of unlike cells are
-        compared.
-    stiff : (n, 6) bool array
-        Pairs that no cut may part: both voxels must keep their relative pose. No rows where
-        there is no such pair.
-    hinged : (a, b, c) int32 array
-        Lattice edges of the template by twice the middle plus 1: a number for the edge on which a
-        hinge there comes to rest in the end, -1 where none may lie. Of no size where all may be
-        used and rest where they are.
+        `extra_cost` of :func:`tree_problem`.
+    expected_cost : (n, m) float32 array
+        Expected `cost` of each voxel in each cell. The beam subtracts it, so that states which
+        fill different cells compare.
+    always_rigid : (n, 6) bool array
+        Pairs of voxels across a face that no cut may part. No rows where there is no such pair.
+    final_edge : (a, b, c) int32 array
+        Lattice edges of the template, indexed by twice their middle plus 1: the number of the edge
+        on which a hinge there lies in the end, -1 where none may lie. The two differ where the
+        template folds once more. Of no size where every edge may be used and is final.
     exposed : (m,) uint8 array
-        Bit ``f`` set where the template ends at face ``f`` of a cell.
-    around : (m, 6) int32 array
+        Bit ``f`` is set where the template ends at face ``f`` of a cell.
+    cell_neighbour : (m, 6) int32 array
         Template cell across each face, -1 outside.
     source : (n, 3) int32 array
+        Cell of each voxel in shape A.
     cells : (m, 3) int32 array
+        Cells of the template.
     rotations : (24, 3, 3) int32 array
-    mask : (n, 24) uint8 array
-        Eighths of its cell that a voxel must have in each rotation, see
+        The lattice rotations, :data:`fabfold.lattice.rotations.ROTATIONS`.
+    octant_mask : (n, 24) uint8 array
+        Octants of its cell that a voxel must have in each rotation, see
         :mod:`fabfold.tree.sharing`; all 255 where no voxel may share.
-    shares : int
+    max_shared : int
         Most cells that may hold two voxels; 0 where none may.
-    seen : (n, 24, 6, 4) float32 array
+    quarter_depth : (n, 24, 6, 4) float32 array
         Weighted ray depth of each quarter of each face, in each rotation; no rows where no voxel
         may share.
-    beside : (6, 6) uint8 array
-        Eighths beside the edge of two faces of a cell.
+    edge_octants : (6, 6) uint8 array
+        Mask of the octants beside the edge of two faces of a cell.
     """
 
     neighbour: NDArray[np.int32]
     allowed: NDArray[np.bool_]
-    step: NDArray[np.int32]
-    weight: NDArray[np.float64]
-    single: int
-    way_start: NDArray[np.int32]
-    way: NDArray[np.int32]
+    child_pose: NDArray[np.int32]
+    joint_weight: NDArray[np.float64]
+    last_single: int
+    realization_start: NDArray[np.int32]
+    realization: NDArray[np.int32]
     cost: NDArray[np.float32]
-    centre: NDArray[np.float32]
-    stiff: NDArray[np.bool_]
-    hinged: NDArray[np.int32]
+    expected_cost: NDArray[np.float32]
+    always_rigid: NDArray[np.bool_]
+    final_edge: NDArray[np.int32]
     exposed: NDArray[np.uint8]
-    around: NDArray[np.int32]
+    cell_neighbour: NDArray[np.int32]
     source: NDArray[np.int32]
     cells: NDArray[np.int32]
     rotations: NDArray[np.int32]
-    mask: NDArray[np.uint8]
-    shares: int
-    seen: NDArray[np.float32]
-    beside: NDArray[np.uint8]
+    octant_mask: NDArray[np.uint8]
+    max_shared: int
+    quarter_depth: NDArray[np.float32]
+    edge_octants: NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -124,18 +155,21 @@ class TreeProblem:
     Attributes
     ----------
     template : Template
+        The shape to fill.
     source : (n, 3) int32 array
-        Cells in shape A.
+        Cell of each voxel in shape A.
     fill : (n,) float64 array
-        Share of each cell that is material.
+        Share of each cell that is material, 0 to 1.
     weights : Weights
+        Weights of the energy.
     joints : tuple of J tuples of 6 Joint
         Joint types by index, one for each face of the parent; index 0 is the rigid joint.
     tables : Tables
-    bias : (n, 24 m) float32 array or None
-        What was added to the surface's energy of each voxel at each pose.
+        What the kernels read.
+    extra_cost : (n, 24 m) float32 array or None
+        Energy that was added to the surface's for each voxel at each pose.
     roots : (k, 2) int32 array or None
-        Voxels and their poses that growing may start from; None for all.
+        Voxels, and their poses, that growing may start from; None for all.
     """
 
     template: Template
@@ -144,17 +178,28 @@ class TreeProblem:
     weights: Weights
     joints: tuple[tuple[Joint, ...], ...]
     tables: Tables
-    bias: NDArray[np.float32] | None = None
+    extra_cost: NDArray[np.float32] | None = None
     roots: NDArray[np.int32] | None = None
 
     def __len__(self) -> int:
         return len(self.source)
 
-    def wished(self, pose: NDArray[np.int32]) -> float:
-        """The part of the energy of a full set of poses that is `bias`."""
-        if self.bias is None:
+    def extra_energy(self, pose: NDArray[np.int32]) -> float:
+        """The part of the energy that is `extra_cost`.
+
+        Parameters
+        ----------
+        pose : (n,) int32 array
+            Full set of poses, ``24 * template cell + rotation``.
+
+        Returns
+        -------
+        float
+            Weighted energy; 0 where nothing was added.
+        """
+        if self.extra_cost is None:
             return 0.0
-        return float(self.bias[np.arange(len(pose)), pose].sum(dtype=np.float64))
+        return float(self.extra_cost[np.arange(len(pose)), pose].sum(dtype=np.float64))
 
     @property
     def empty_face(self) -> float:
@@ -164,21 +209,32 @@ class TreeProblem:
     @cached_property
     def single_tables(self) -> Tables:
         """The tables without double hinges."""
-        tables, last = self.tables, self.tables.single + 1
+        tables, last = self.tables, self.tables.last_single + 1
         if last == len(self.joints):
             return tables
         return tables._replace(
             allowed=np.ascontiguousarray(tables.allowed[:, :, :last]),
-            step=np.ascontiguousarray(tables.step[:, :last]),
-            weight=tables.weight[:last].copy(),
-            way_start=np.ascontiguousarray(tables.way_start[:, : last + 1]),
+            child_pose=np.ascontiguousarray(tables.child_pose[:, :last]),
+            joint_weight=tables.joint_weight[:last].copy(),
+            realization_start=np.ascontiguousarray(tables.realization_start[:, : last + 1]),
         )
 
     def shareable(self, colour: NDArray[np.integer]) -> tuple[int, int]:
-        """Most pairs of voxels of each colour that may share a cell."""
-        partial = self.tables.mask[:, 0] != WHOLE
+        """Most pairs of voxels of each colour that may share a cell.
+
+        Parameters
+        ----------
+        colour : (n,) int array
+            Checkerboard colour of each voxel, 0 or 1.
+
+        Returns
+        -------
+        (int, int)
+            Pairs of colour 0, and of colour 1.
+        """
+        partial = self.tables.octant_mask[:, 0] != WHOLE
         pairs = [int((partial & (colour == c)).sum()) // 2 for c in (0, 1)]
-        return min(pairs[0], self.tables.shares), min(pairs[1], self.tables.shares)
+        return min(pairs[0], self.tables.max_shared), min(pairs[1], self.tables.max_shared)
 
     @property
     def keeps_colour(self) -> bool:
@@ -186,10 +242,15 @@ class TreeProblem:
         return all(sum(joint.offset) % 2 for by_face in self.joints for joint in by_face)
 
     def colourings(self) -> list[int]:
-        """Colours (0, 1) of template cells that voxels of source colour 0 can take.
+        """Checkerboard colours of template cells that voxels of source colour 0 can take.
 
         Rigid joints, 180° single hinges and double hinges onto a face neighbour keep the
         checkerboard colouring; where other joints are in use, every cell can be taken.
+
+        Returns
+        -------
+        list of int
+            0, 1 or both.
 
         Raises
         ------
@@ -210,7 +271,7 @@ class TreeProblem:
             for c, (first, second) in enumerate(short)
             if first <= spare[0]
             and second <= spare[1]
-            and max(first, 0) + max(second, 0) <= self.tables.shares
+            and max(first, 0) + max(second, 0) <= self.tables.max_shared
         ]
         if not fits:
             raise NoTreeError(
@@ -227,18 +288,27 @@ def joint_table(
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.uint8]]:
     """Where joints carry a child, for every pose of the parent.
 
+    Parameters
+    ----------
+    template : Template
+        The shape to fill.
+    joints : sequence of sequences of Joint
+        Joint types by index, one for each face of the parent.
+
     Returns
     -------
-    step : (6, J, 24 m) int32 array
-    around : (m, 6) int32 array
+    child_pose : (6, J, 24 m) int32 array
+        Pose of the child from the face, the joint and the parent's pose; -1 outside the template.
+    cell_neighbour : (m, 6) int32 array
+        Template cell across each face, -1 outside.
     exposed : (m,) uint8 array
-        As in :class:`Tables`.
+        Bit ``f`` is set where the template ends at face ``f`` of a cell.
     """
     cells = template.cells
     pad = 2
     grid = np.full(np.array(template.shape) + 2 * pad, -1, dtype=np.int32)
     grid[tuple((cells + pad).T)] = np.arange(len(cells), dtype=np.int32)
-    step = np.full((6, len(joints), 24 * len(cells)), -1, dtype=np.int32)
+    child_pose = np.full((6, len(joints), 24 * len(cells)), -1, dtype=np.int32)
     parents = 24 * np.arange(len(cells), dtype=np.int32)
     for index, by_face in enumerate(joints):
         for face, joint in enumerate(by_face):
@@ -246,15 +316,15 @@ def joint_table(
                 moved = cells + ROTATIONS[rotation] @ np.array(joint.offset, dtype=np.int32) + pad
                 landing = grid[tuple(moved.T)]
                 turned = ROTATION_PRODUCT[rotation, joint.rotation]
-                step[face, index, parents + rotation] = np.where(
+                child_pose[face, index, parents + rotation] = np.where(
                     landing >= 0, 24 * landing + turned, -1
                 )
-    around = np.stack([grid[tuple((cells + d + pad).T)] for d in FACES], axis=1)
-    exposed = ((around < 0) << np.arange(6)).sum(axis=1).astype(np.uint8)
-    return step, np.ascontiguousarray(around), exposed
+    cell_neighbour = np.stack([grid[tuple((cells + d + pad).T)] for d in FACES], axis=1)
+    exposed = ((cell_neighbour < 0) << np.arange(6)).sum(axis=1).astype(np.uint8)
+    return child_pose, np.ascontiguousarray(cell_neighbour), exposed
 
 
-def _way_table(
+def _realization_table(
     joints: Sequence[Sequence[Joint]],
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     found: list[tuple[int, int, int, int]] = []
@@ -262,7 +332,7 @@ def _way_table(
     for face in range(6):
         for index, by_face in enumerate(joints):
             start[face, index] = len(found)
-            found += ways(by_face[face])
+            found += realizations(by_face[face])
         start[face, len(joints)] = len(found)
     return start, np.array(found, dtype=np.int32).reshape(-1, 4)
 
@@ -270,26 +340,42 @@ def _way_table(
 def cost_table(
     depth: NDArray[np.float64],
     exposed: NDArray[np.uint8],
-    weight: float,
-    bias: NDArray[np.floating] | None,
+    surface_weight: float,
+    extra_cost: NDArray[np.floating] | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """``Tables.cost`` and ``Tables.centre`` of voxels with ray depths (n, 6)."""
-    # Face f of the cell in B is face turned[r, f] of the voxel in A.
-    turned = np.array(
-        [[int(np.flatnonzero((d @ r == FACES).all(axis=1))[0]) for d in FACES] for r in ROTATIONS]
-    )
+    """Energy of each voxel at each pose.
+
+    Parameters
+    ----------
+    depth : (n, 6) float64 array
+        Mean ray depth into each voxel from each of its faces in A, 0 to 1 (Eq. 8).
+    exposed : (m,) uint8 array
+        Faces of each template cell that the box shows, see :class:`Tables`.
+    surface_weight : float
+        Weight of the surface's energy.
+    extra_cost : (n, 24 m) float array or None
+        Energy added for a voxel at a pose.
+
+    Returns
+    -------
+    cost : (n, 24 m) float32 array
+        As in :class:`Tables`.
+    expected_cost : (n, m) float32 array
+        As in :class:`Tables`.
+    """
     bits = (exposed[:, None] >> np.arange(6)) & 1
-    by_face = np.asarray(depth, dtype=float)[:, turned]
-    cost = weight * np.einsum("nrf,mf->nmr", by_face, bits)
-    if bias is not None:
-        cost += np.asarray(bias, dtype=float).reshape(cost.shape)
+    # Face f of the cell in B is face FACE_BEFORE[r, f] of the voxel in A.
+    by_face = np.asarray(depth, dtype=float)[:, FACE_BEFORE]
+    cost = surface_weight * np.einsum("nrf,mf->nmr", by_face, bits)
+    if extra_cost is not None:
+        cost += np.asarray(extra_cost, dtype=float).reshape(cost.shape)
     by_cell = cost.mean(axis=2)
     cell_mean = by_cell.mean(axis=0)
     voxel_mean = (by_cell - cell_mean).mean(axis=1)
-    centre = cell_mean[None, :] + voxel_mean[:, None]
+    expected_cost = cell_mean[None, :] + voxel_mean[:, None]
     return (
         np.ascontiguousarray(cost.reshape(len(cost), -1), dtype=np.float32),
-        np.ascontiguousarray(centre, dtype=np.float32),
+        np.ascontiguousarray(expected_cost, dtype=np.float32),
     )
 
 
@@ -303,8 +389,8 @@ def tree_problem(
     depth: NDArray[np.float64],
     fill: NDArray[np.float64] | None = None,
     weights: Weights | None = None,
-    bias: NDArray[np.floating] | None = None,
-    stiff: NDArray[np.bool_] | None = None,
+    extra_cost: NDArray[np.floating] | None = None,
+    always_rigid: NDArray[np.bool_] | None = None,
     double: NDArray[np.bool_] | None = None,
     joints: JointSet = "S",
     share: NDArray[np.bool_] | None = None,
@@ -314,8 +400,9 @@ def tree_problem(
     Parameters
     ----------
     cells : (n, 3) int array
-        Source cells.
+        Cell of each voxel in shape A.
     template : Template
+        The shape to fill.
     pairs : (k, 2) int array
         Voxels ``i, j`` that share a face.
     rigid : (k,) bool array
@@ -328,9 +415,10 @@ def tree_problem(
     fill : (n,) float array, optional
         Share of each cell that is material.
     weights : Weights, optional
-    bias : (n, 24 m) float array, optional
+        Weights of the energy; by default those of the paper.
+    extra_cost : (n, 24 m) float array, optional
         Energy added for a voxel at a pose, on top of the surface's.
-    stiff : (k,) bool array, optional
+    always_rigid : (k,) bool array, optional
         Pairs that no cut may part; `rigid` must hold for them.
     double : (k,) bool array, optional
         Whether the shared face has room for the link plate of a double hinge; by default none has.
@@ -339,6 +427,11 @@ def tree_problem(
     share : (n, s, s, s) bool array, optional
         Material in each cell: two voxels may take one template cell where their eighths allow it.
         Without it every voxel has a cell of its own.
+
+    Returns
+    -------
+    TreeProblem
+        What :func:`fabfold.tree.solve.solve` takes.
 
     Raises
     ------
@@ -349,72 +442,76 @@ def tree_problem(
     cells = np.asarray(cells, dtype=np.int32).reshape(-1, 3)
     count = len(cells)
     masks = np.full(count, WHOLE, np.uint8) if share is None else octant_masks(share)
-    shares = 0 if share is None else min(most_shared(count), int((masks != WHOLE).sum()) // 2)
-    if count == 0 or count > len(template) + shares:
+    max_shared = (
+        0 if share is None else min(max_shared_cells(count), int((masks != WHOLE).sum()) // 2)
+    )
+    if count == 0 or count > len(template) + max_shared:
         raise NoTreeError(
             f"{count} voxels cannot go into template {template.name!r} of {len(template)} cells: "
             "take a larger template or a coarser grid"
         )
-    rows = joint_rows(joints)
-    step, around, exposed = joint_table(template, rows)
-    way_start, way = _way_table(rows)
-    singles = sum(by_face[0].kind == "S" for by_face in rows)
-    roomy = np.zeros(len(pairs), dtype=bool) if double is None else np.asarray(double, dtype=bool)
+    rows = joint_types(joints)
+    child_pose, cell_neighbour, exposed = joint_table(template, rows)
+    realization_start, realization = _realization_table(rows)
+    last_single = sum(by_face[0].kind == "S" for by_face in rows)
+    has_plate_room = (
+        np.zeros(len(pairs), dtype=bool) if double is None else np.asarray(double, dtype=bool)
+    )
     neighbour = np.full((count, 6), -1, dtype=np.int32)
     allowed = np.zeros((count, 6, len(rows)), dtype=bool)
-    for (i, j), solid, edges, plate in zip(pairs, rigid, hinge, roomy, strict=True):
+    for (i, j), solid, edges, plate in zip(pairs, rigid, hinge, has_plate_room, strict=True):
         face = int(np.flatnonzero((cells[j] - cells[i] == FACES).all(axis=1))[0])
         # Both faces list the same edges in the same order, so one row serves either parent.
         for parent, child, side in ((i, j, face), (j, i, face ^ 1)):
             allowed[parent, side, 0] = solid
-            allowed[parent, side, 1 : singles + 1] = np.tile(edges, singles // 4)
-            allowed[parent, side, singles + 1 :] = plate
+            allowed[parent, side, 1 : last_single + 1] = np.tile(edges, last_single // 4)
+            allowed[parent, side, last_single + 1 :] = plate
             if allowed[parent, side].any():
                 neighbour[parent, side] = child
     _require_connected(neighbour)
-    cost, centre = cost_table(depth, exposed, weights.surface, bias)
-    whole = np.zeros((count, 6), dtype=bool)
-    if stiff is not None and np.any(stiff):
-        for i, j in np.asarray(pairs)[np.asarray(stiff, dtype=bool)].tolist():
+    cost, expected_cost = cost_table(depth, exposed, weights.surface, extra_cost)
+    rigid_faces = np.zeros((count, 6), dtype=bool)
+    if always_rigid is not None and np.any(always_rigid):
+        for i, j in np.asarray(pairs)[np.asarray(always_rigid, dtype=bool)].tolist():
             face = int(np.flatnonzero((cells[j] - cells[i] == FACES).all(axis=1))[0])
-            whole[i, face] = whole[j, face ^ 1] = True
+            rigid_faces[i, face] = rigid_faces[j, face ^ 1] = True
             allowed[i, face, 1:] = allowed[j, face ^ 1, 1:] = False
-    hinged = np.zeros((0, 0, 0), dtype=np.int32)
+    final_edge = np.zeros((0, 0, 0), dtype=np.int32)
     if template.joints == "inside":
         inside = template.inside_edges()
         number = np.arange(inside.size, dtype=np.int32).reshape(inside.shape)
-        hinged = np.where(inside, number, np.int32(-1))
+        final_edge = np.where(inside, number, np.int32(-1))
     tables = Tables(
         neighbour=neighbour,
         allowed=allowed,
-        step=step,
-        weight=np.array(
+        child_pose=child_pose,
+        joint_weight=np.array(
             [
                 {"R": weights.rigid, "S": weights.single, "D": weights.double}[r[0].kind]
                 for r in rows
             ]
         ),
-        single=singles,
-        way_start=way_start,
-        way=way,
+        last_single=last_single,
+        realization_start=realization_start,
+        realization=realization,
         cost=cost,
-        centre=centre,
-        stiff=whole if whole.any() else whole[:0],
-        hinged=hinged,
+        expected_cost=expected_cost,
+        always_rigid=rigid_faces if rigid_faces.any() else rigid_faces[:0],
+        final_edge=final_edge,
         exposed=exposed,
-        around=around,
+        cell_neighbour=cell_neighbour,
         source=cells,
         # A template's own cells are read-only, which would be another signature to the kernels.
         cells=template.cells.copy(),
         rotations=ROTATIONS,
-        mask=turned_masks(masks) if shares else np.full((count, 24), WHOLE, np.uint8),
-        shares=shares,
-        seen=(
-            seen_depths(share, weights.surface)
-            if shares and share is not None
+        octant_mask=turned_masks(masks) if max_shared else np.full((count, 24), WHOLE, np.uint8),
+        max_shared=max_shared,
+        quarter_depth=(
+            quarter_depths(share, weights.surface)
+            if max_shared and share is not None
             else np.zeros((0, 24, 6, 4), np.float32)
         ),
-        beside=beside().copy(),
+        edge_octants=edge_octants().copy(),
     )
     return TreeProblem(
         template=template,
@@ -423,7 +520,9 @@ def tree_problem(
         weights=weights,
         joints=rows,
         tables=tables,
-        bias=None if bias is None else np.asarray(bias, dtype=np.float32).reshape(count, -1),
+        extra_cost=None
+        if extra_cost is None
+        else np.asarray(extra_cost, dtype=np.float32).reshape(count, -1),
     )
 
 
@@ -433,8 +532,8 @@ def from_features(
     template: Template,
     weights: Weights | None = None,
     *,
-    bias: NDArray[np.floating] | None = None,
-    stiff: NDArray[np.bool_] | None = None,
+    extra_cost: NDArray[np.floating] | None = None,
+    always_rigid: NDArray[np.bool_] | None = None,
     joints: JointSet = "S",
     share: bool = False,
 ) -> TreeProblem:
@@ -442,19 +541,32 @@ def from_features(
 
     Parameters
     ----------
-    voxels, features, template, weights
-    bias : (n, 24 m) float array, optional
-    stiff : (k,) bool array, optional
-        See :func:`tree_problem`; ``k`` are the pairs of `features`.
+    voxels : Voxels
+        The voxelization.
+    features : Features
+        Its printable joints and ray depths.
+    template : Template
+        The shape to fill.
+    weights : Weights, optional
+        Weights of the energy; by default those of the paper.
+    extra_cost : (n, 24 m) float array, optional
+        Energy added for a voxel at a pose, on top of the surface's.
+    always_rigid : (k,) bool array, optional
+        Which of the k pairs of `features` no cut may part.
     joints : str
         Joint types in use, see :data:`fabfold.tree.catalogue.JOINT_SETS`.
     share : bool
         Whether two voxels may take one cell where their material allows it.
 
+    Returns
+    -------
+    TreeProblem
+        What :func:`fabfold.tree.solve.solve` takes.
+
     Raises
     ------
     NoTreeError
-        As for :func:`tree_problem`.
+        If there are more voxels than template cells, or no tree can join the voxels at all.
     """
     return tree_problem(
         voxels.cells,
@@ -465,8 +577,8 @@ def from_features(
         depth=features.depth,
         fill=voxels.fill,
         weights=weights,
-        bias=bias,
-        stiff=stiff,
+        extra_cost=extra_cost,
+        always_rigid=always_rigid,
         double=features.double,
         joints=joints,
         share=voxels.subvoxels if share else None,

@@ -1,8 +1,10 @@
-"""Two partly filled voxels in one template cell (paper section 4, collision term).
+"""Octants of a cell, so that two partly filled voxels can go into one template cell.
 
-A cell has eight eighths (octants). A voxel that shares keeps to the eighths that hold its material,
-and two voxels may take one cell where their eighths, turned as they come to lie, are all different.
-Bit ``4 x + 2 y + z`` of a mask stands for the octant on the side ``x, y, z`` (0 low, 1 high).
+The collision term of the paper (section 4) lets two voxels take one place where their meshes do not
+overlap. Here a cell has eight octants. A voxel that shares keeps to the octants that hold its
+material, and two voxels may take one cell where their octants, turned as they come to lie, are all
+different. Bit ``4 x + 2 y + z`` of a mask stands for the octant on the side ``x, y, z`` (0 low,
+1 high).
 """
 
 from __future__ import annotations
@@ -12,15 +14,15 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.lattice.rotations import FACES, ROTATIONS
+from fabfold.lattice.rotations import FACE_BEFORE, FACES, ROTATIONS
 
 __all__ = [
-    "LEAST",
+    "LEAST_FILL",
     "WHOLE",
-    "beside",
-    "most_shared",
+    "edge_octants",
+    "max_shared_cells",
     "octant_masks",
-    "seen_depths",
+    "quarter_depths",
     "shared_octants",
     "turned_masks",
     "unpacked",
@@ -28,9 +30,9 @@ __all__ = [
 
 #: The mask of a whole cell.
 WHOLE = 255
-#: An eighth with less than this share of material is given up by a voxel that shares: half a per
-#: cent of a cell, as much as a loose crumb that joinery leaves out.
-LEAST = 0.04
+#: An octant that is less full than this is given up by a voxel that shares: half a per cent of a
+#: cell, as much as a loose crumb that joinery leaves out.
+LEAST_FILL = 0.04
 #: At most one voxel in so many sits in the cell of another one.
 _ONE_IN = 10
 
@@ -38,16 +40,27 @@ _ONE_IN = 10
 _SIDES: NDArray[np.int64] = np.indices((2, 2, 2)).reshape(3, 8).T
 
 
-def most_shared(voxels: int) -> int:
-    """Most cells with two voxels that a tree may have."""
+def max_shared_cells(voxels: int) -> int:
+    """Most cells with two voxels that a tree may have.
+
+    Parameters
+    ----------
+    voxels : int
+        Number of voxels.
+
+    Returns
+    -------
+    int
+        One for every ten voxels.
+    """
     return voxels // _ONE_IN
 
 
 def octant_masks(subvoxels: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Which eighths of its cell a voxel must have.
+    """Which octants of its cell a voxel must have.
 
-    Those with at least `LEAST` of material. A voxel whose eighths do not hang together by faces
-    gets the whole cell: nothing could tie it together.
+    Those that are filled to at least :data:`LEAST_FILL`. A voxel whose octants do not hang together
+    by faces gets the whole cell: nothing could tie it together.
 
     Parameters
     ----------
@@ -57,12 +70,12 @@ def octant_masks(subvoxels: NDArray[np.bool_]) -> NDArray[np.uint8]:
     Returns
     -------
     (n,) uint8 array
-        Never 0; 255 where nothing is left to share.
+        Mask of each voxel in shape A, never 0; 255 where nothing is left to share.
     """
     count, size = subvoxels.shape[:2]
     half = size // 2
     share = subvoxels.reshape(count, 2, half, 2, half, 2, half).mean(axis=(2, 4, 6))
-    held = share.reshape(count, 8) >= LEAST
+    held = share.reshape(count, 8) >= LEAST_FILL
     bits = (held << np.arange(8)).sum(axis=1)
     return np.array([b if _hangs_together(int(b)) else WHOLE for b in bits], dtype=np.uint8)
 
@@ -93,42 +106,59 @@ def turned_masks(masks: NDArray[np.uint8]) -> NDArray[np.uint8]:
     Parameters
     ----------
     masks : (n,) uint8 array
-        In shape A.
+        Mask of each voxel in shape A.
 
     Returns
     -------
     (n, 24) uint8 array
+        Mask of each voxel in each rotation.
     """
     bits = (np.asarray(masks)[:, None] >> np.arange(8)) & 1
     return np.asarray((bits[:, None, :] << _places()[None]).sum(axis=2), dtype=np.uint8)
 
 
 def unpacked(masks: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Masks as arrays, (n, 2, 2, 2) bool, indexed by the side along x, y and z."""
+    """Masks as arrays.
+
+    Parameters
+    ----------
+    masks : (n,) uint8 array
+        Mask of each voxel.
+
+    Returns
+    -------
+    (n, 2, 2, 2) bool array
+        Indexed by the voxel and the side along x, y and z.
+    """
     bits = (np.asarray(masks)[:, None] >> np.arange(8)) & 1
     return bits.astype(bool).reshape(-1, 2, 2, 2)
 
 
 @cache
-def beside() -> NDArray[np.uint8]:
-    """The two octants beside each edge of a cell, by its two faces: (6, 6) masks.
+def edge_octants() -> NDArray[np.uint8]:
+    """The two octants beside each edge of a cell.
 
     A hinge on the edge has its knuckles and its bracket there.
+
+    Returns
+    -------
+    (6, 6) uint8 array
+        Mask for the edge of two faces, by these faces.
     """
     on = np.array([(2 * _SIDES - 1) @ face > 0 for face in FACES])
     both = on[:, None] & on[None, :]
     return np.asarray((both << np.arange(8)).sum(axis=2), dtype=np.uint8)
 
 
-def seen_depths(subvoxels: NDArray[np.bool_], weight: float) -> NDArray[np.float32]:
+def quarter_depths(subvoxels: NDArray[np.bool_], weight: float) -> NDArray[np.float32]:
     """Weighted ray depth (Eq. 8) of each quarter of each face, in each rotation.
 
     Parameters
     ----------
     subvoxels : (n, s, s, s) bool array
-        s even.
+        Material in each cell in shape A, s even.
     weight : float
-        Of the surface in the energy.
+        Weight of the surface in the energy.
 
     Returns
     -------
@@ -149,18 +179,17 @@ def seen_depths(subvoxels: NDArray[np.bool_], weight: float) -> NDArray[np.float
             where = 2 * _SIDES[:, rest[0]] + _SIDES[:, rest[1]]
             depth[:, 2 * axis + sign] = quarter.reshape(count, 4)[:, where]
     out = np.empty((count, 24, 6, 4), dtype=np.float32)
-    for r, rotation in enumerate(ROTATIONS):
+    for r in range(len(ROTATIONS)):
         back = np.argsort(_places()[r])  # octant in A of each octant in B
         for f, face in enumerate(FACES):
             inner = np.flatnonzero((2 * _SIDES - 1) @ face > 0)
-            from_face = int(np.flatnonzero((face @ rotation == FACES).all(axis=1))[0])
             # Octants are numbered by x, y, z, so those beside a face are in the wanted order.
-            out[:, r, f] = depth[:, from_face][:, back[inner]]
+            out[:, r, f] = depth[:, FACE_BEFORE[r, f]][:, back[inner]]
     return np.ascontiguousarray(0.25 * weight * out, dtype=np.float32)
 
 
 def shared_octants(pose: NDArray[np.int32], masks: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
-    """The eighths that count of each voxel, once it is known which voxels share.
+    """The octants that count of each voxel, once it is known which voxels share.
 
     Parameters
     ----------

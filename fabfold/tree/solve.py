@@ -1,4 +1,10 @@
-"""Find joint trees that fold (paper section 4, with folding inside the search)."""
+"""Find joint trees that fold (paper section 4, with folding inside the search).
+
+:func:`solve` runs one seed. Simulated annealing over sets of poses lowers the energy, each step a
+large-neighbourhood move. Phase A adds a penalty for what does not fold yet, until a tree folds.
+Phase B anneals among trees that fold. Threshold acceptance with an exponential random number is the
+same as the Metropolis rule.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +19,13 @@ from fabfold.errors import NoFoldError, NoTreeError
 from fabfold.tree.assembly import HingeChoice, SpanningTree, fold_tree, hinge_choice
 from fabfold.tree.effort import Effort
 from fabfold.tree.fold_tree import FoldTree
-from fabfold.tree.foldability import Foldability, Outlook
-from fabfold.tree.grow import energy_of
+from fabfold.tree.foldability import Foldability, PlannerEstimate
+from fabfold.tree.initial_poses import grow
+from fabfold.tree.large_neighbourhood import ruin_and_recreate
+from fabfold.tree.pose_energy import energy_of
 from fabfold.tree.problem import TreeProblem
-from fabfold.tree.rebuild import loose_pieces
 from fabfold.tree.rng import generator
-from fabfold.tree.ruin import propose
-from fabfold.tree.starts import grow
+from fabfold.tree.spanning_trees import loose_pieces
 from fabfold.tree.swept_cells import hinge_tables
 
 __all__ = ["Candidate", "Statistics", "solve"]
@@ -32,6 +38,7 @@ class Candidate:
     Attributes
     ----------
     tree : FoldTree
+        The tree.
     path : (m, 2) int32 array
         One row a move, A to B: hinge index and signed quarter turns about its positive axis.
     seed : int
@@ -50,54 +57,110 @@ class Candidate:
 
 @dataclass
 class Statistics:
-    """What one run did, in counts."""
+    """What one run did, in counts.
+
+    Attributes
+    ----------
+    grown : int
+        Full sets of poses grown.
+    starts : int
+        Those whose clusters hinges could join, so that phase A began.
+    removals : int
+        Large-neighbourhood steps.
+    judged : int
+        Sets of poses that were judged.
+    trees : int
+        Spanning trees drawn for them.
+    closed : int
+        Spanning trees that passed the closure test.
+    planner_runs : int
+        Trees that the planner was asked about.
+    second_runs : int
+        Those that it was asked about again, with more patience.
+    folded : int
+        Steps of phase B that led to a tree that folds.
+    """
 
     grown: int = 0
+    starts: int = 0
     removals: int = 0
     judged: int = 0
     trees: int = 0
     closed: int = 0
-    glances: int = 0
-    looks: int = 0
-    starts: int = 0
+    planner_runs: int = 0
+    second_runs: int = 0
     folded: int = 0
-    log: list[str] = field(default_factory=list)
 
 
-_NOWHERE = np.empty(0, np.int32)
+#: No voxel in particular to start a removal from.
+_ANYWHERE = np.empty(0, np.int32)
 
 
 @dataclass(frozen=True)
 class _State:
-    """Full poses, their hinges, and what the objective says of them."""
+    """Full poses, their hinges, and what the objective says of them.
+
+    Attributes
+    ----------
+    pose : (n,) int32 array
+        ``24 * template cell + rotation`` of each voxel.
+    energy : float
+        Weighted energy of the poses.
+    tree : SpanningTree or None
+        The best of the spanning trees drawn.
+    penalty : float
+        For what does not fold of that tree; 0 when it folds.
+    focus : (k,) int32 array
+        Voxels on hinges in trouble.
+    guide : (g, 5) int32 array or None
+        Steps that the planner found for the tree.
+    """
 
     pose: NDArray[np.int32]
     energy: float
     tree: SpanningTree | None
     penalty: float
-    focus: NDArray[np.int32] = field(default_factory=lambda: _NOWHERE)
+    focus: NDArray[np.int32] = field(default_factory=lambda: _ANYWHERE)
     guide: NDArray[np.int32] | None = None
 
 
 @dataclass(frozen=True)
-class _Scale:
-    """Weights of the folding phase, which depend on the size of the problem."""
+class _FoldingObjective:
+    """Weights and temperatures of phase A, which depend on the size of the problem.
 
-    stuck: float
-    cost: float
+    Attributes
+    ----------
+    stuck_hinge : float
+        Penalty for a hinge that cannot move.
+    energy : float
+        Factor on the energy of the poses.
+    joint : float
+        Energy of a single hinge in phase A.
+    hot, cold : float
+        First and last temperature.
+    """
+
+    stuck_hinge: float
+    energy: float
     joint: float
     hot: float
     cold: float
-    focus: float = 0.5
-    loose: float = 10.0
 
 
-def _scale(voxels: int) -> _Scale:
+#: Share of steps of phase A that start from the hinges in trouble.
+_FOCUSED = 0.5
+#: Share of steps of phase A that draw other trees for the same poses.
+_SAME_POSES = 0.05
+#: Energy of a piece that no hinge joins, while poses are made joinable and after.
+_PIECE_WHILE_JOINING, _PIECE = 2.0, 10.0
+
+
+def _folding_objective(voxels: int) -> _FoldingObjective:
     # A hinge that cannot move must cost about as much as the energy a few joints bring; large
     # problems need the penalty to rule, or the energy freezes before anything folds.
     if voxels <= 72:
-        return _Scale(stuck=0.15, cost=1.0, joint=0.1, hot=0.15, cold=0.02)
-    return _Scale(stuck=1.0, cost=0.2, joint=0.1, hot=0.1, cold=0.01)
+        return _FoldingObjective(stuck_hinge=0.15, energy=1.0, joint=0.1, hot=0.15, cold=0.02)
+    return _FoldingObjective(stuck_hinge=1.0, energy=0.2, joint=0.1, hot=0.1, cold=0.01)
 
 
 class _Search:
@@ -122,13 +185,13 @@ class _Search:
         self.stopped = stop or (lambda: False)
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
         self.generator = generator(int(self.rng.integers(2**62)))
-        self.scale = _scale(len(problem))
+        self.objective = _folding_objective(len(problem))
         # Phase A has a joint weight of its own; double hinges keep their ratio to single ones.
         single, double = problem.weights.single, problem.weights.double
-        weight = np.full(len(problem.joints), self.scale.joint)
-        weight[problem.tables.single + 1 :] *= double / single if single > 0 else 1.0
+        weight = np.full(len(problem.joints), self.objective.joint)
+        weight[problem.tables.last_single + 1 :] *= double / single if single > 0 else 1.0
         weight[0] = 0.0
-        self.softened = self.tables = problem.tables._replace(weight=weight)
+        self.phase_a_tables = self.tables = problem.tables._replace(joint_weight=weight)
         self.results: list[_State] = []
 
     # --- moves -----------------------------------------------------------------------------
@@ -138,46 +201,46 @@ class _Search:
         pose: NDArray[np.int32],
         threshold: float,
         tries: int,
-        loose: float,
-        focus: NDArray[np.int32] = _NOWHERE,
+        piece_penalty: float,
+        focus: NDArray[np.int32] = _ANYWHERE,
     ) -> tuple[NDArray[np.int32], float, int] | None:
         """Other poses with energy, and penalty for loose pieces, of at most `threshold`.
 
         Returns
         -------
         (pose, energy, loose pieces) or None
+            None where no removal led to such poses.
         """
         effort = self.effort
         out = np.empty(len(pose), np.int32)
-        used, energy, left = propose(
-            self.tables, pose, self.problem.empty_face, hinge_tables(), loose, threshold,
-            focus, tries, effort.least, min(effort.most, len(pose)), effort.rebeam, 0.05, 1.0,
-            self.generator, out,
+        used, energy, left = ruin_and_recreate(
+            self.tables, pose, self.problem.empty_face, hinge_tables(), piece_penalty, threshold,
+            focus, tries, effort.min_removed, min(effort.max_removed, len(pose)),
+            effort.repair_beam_width, 0.05, 1.0, self.generator, out,
         )  # fmt: skip
         self.statistics.removals += used
         return None if math.isinf(energy) else (out, energy, left)
 
-    def hang_together(self, pose: NDArray[np.int32]) -> _State | None:
+    def make_joinable(self, pose: NDArray[np.int32]) -> _State | None:
         """Anneal grown poses until hinges that can turn join all the clusters."""
-        loose = 2.0
         choice = hinge_choice(self.problem, pose)
-        rows = choice.found
-        left = int(loose_pieces(rows, len(rows), choice.clusters, 8, self.generator))
+        left = int(loose_pieces(choice.rows, choice.clusters, 8, self.generator))
         value, _ = energy_of(self.tables, pose, self.problem.empty_face)
-        value += loose * left
+        value += _PIECE_WHILE_JOINING * left
         last = self.statistics.removals + self.effort.removals
         while left > 0 and self.statistics.removals < last and not self.stopped():
-            found = self.neighbour(pose, value + 0.3 * self.rng.exponential(), 100, loose)
+            threshold = value + 0.3 * self.rng.exponential()
+            found = self.neighbour(pose, threshold, 100, _PIECE_WHILE_JOINING)
             if found is not None:
                 pose, value, left = found
         return None if left else _State(pose, value, None, 0.0)
 
     def trees(
-        self, choice: HingeChoice, keys: set[tuple[int, int]], count: int
+        self, choice: HingeChoice, kept_pairs: set[tuple[int, int]], count: int
     ) -> Iterator[SpanningTree]:
-        """Different random spanning trees; the first ones keep most of the hinges in `keys`."""
+        """Different random spanning trees; the first ones keep most hinges of `kept_pairs`."""
         seen: set[frozenset[tuple[int, int]]] = set()
-        kept = choice.wanted(keys, 1.0)
+        kept = choice.preference(kept_pairs, 1.0)
         for k in range(count):
             bonus = (2.0, 0.7, 0.0)[min(k, 2)]
             for _ in range(8):
@@ -187,30 +250,33 @@ class _Search:
                     break
             else:
                 continue
-            mark = frozenset(tree.keys)
-            if mark not in seen:
-                seen.add(mark)
+            pairs = frozenset(tree.hinged_pairs)
+            if pairs not in seen:
+                seen.add(pairs)
                 self.statistics.trees += 1
                 yield tree
 
     # --- judging ---------------------------------------------------------------------------
 
-    def outlook(self, tree: SpanningTree, guide: NDArray[np.int32] | None, strict: bool) -> Outlook:
-        """What the planner leaves, with a second look where that is little.
+    def planner_estimate(
+        self, tree: SpanningTree, guide: NDArray[np.int32] | None, polishing: bool
+    ) -> PlannerEstimate:
+        """What the planner leaves of a tree; it runs again where that is little.
 
-        A tree that folds is changed a little at a time, so a long look along its steps finds most
-        that there is to find. Before anything folds, a look without them does more.
+        A tree that folds is changed a little at a time, so a long run along its steps finds most
+        that there is to find. Before anything folds, a run without them does more.
         """
-        self.statistics.glances += 1
-        found = self.judge.outlook(tree.system, self.effort.glance, guide)
-        left = found.left.sum()
-        if 0 < left <= self.effort.near * 2 * len(found.left):
-            self.statistics.looks += 1
-            if strict:
-                other = self.judge.outlook(tree.system, self.effort.strict_look, guide)
+        effort = self.effort
+        self.statistics.planner_runs += 1
+        found = self.judge.estimate(tree.system, effort.short_patience, guide)
+        left = found.unresolved.sum()
+        if 0 < left <= effort.near_miss * 2 * len(found.unresolved):
+            self.statistics.second_runs += 1
+            if polishing:
+                other = self.judge.estimate(tree.system, effort.polish_patience, guide)
             else:
-                other = self.judge.outlook(tree.system, self.effort.look)
-            if other.left.sum() < left:
+                other = self.judge.estimate(tree.system, effort.long_patience)
+            if other.unresolved.sum() < left:
                 return other
         return found
 
@@ -227,17 +293,18 @@ class _Search:
         kept: set[tuple[int, int]] = set()
         guide = None
         if before is not None and before.tree is not None:
-            kept, guide = before.tree.keys, before.guide
-        for tree in self.trees(choice, kept, self.effort.trees):
+            kept, guide = before.tree.hinged_pairs, before.guide
+        for tree in self.trees(choice, kept, self.effort.spanning_trees):
             stuck = self.judge.stuck_hinges(tree.system)
-            penalty = self.scale.stuck * float(stuck.sum())
+            penalty = self.objective.stuck_hinge * float(stuck.sum())
             trouble = stuck.any(axis=0)
             steps = guide
             if penalty == 0:
                 self.statistics.closed += 1
-                found = self.outlook(tree, guide, bound == 0.0)
-                trouble = found.left > 0
-                penalty = self.scale.stuck * float(found.left.sum()) / max(1, 2 * len(trouble))
+                found = self.planner_estimate(tree, guide, bound == 0.0)
+                trouble = found.unresolved > 0
+                left = float(found.unresolved.sum())
+                penalty = self.objective.stuck_hinge * left / max(1, 2 * len(trouble))
                 steps = found.guide
             if best is None or penalty < best.penalty:
                 focus = np.unique(tree.joints[trouble, :2]).astype(np.int32)
@@ -252,34 +319,34 @@ class _Search:
 
     def fold(self, start: _State) -> _State | None:
         """Phase A: trade energy for foldability until a tree folds."""
-        scale, count = self.scale, len(self.problem)
+        objective, count = self.objective, len(self.problem)
         now = self.judged(start.pose, start.energy, None, math.inf)
         if now is None:
             return None
-        # Closing (no hinge stuck for good) costs little a step; looks at the planner cost much.
-        closing, looking = self.effort.closing * count, self.effort.looking * count
-        glances = step = 0
-        while step < closing and glances < looking and not self.stopped():
+        # Closure tests cost little each, runs of the planner cost much: each has its own budget.
+        most_tests, most_runs = self.effort.closure_tests * count, self.effort.planner_runs * count
+        runs = tests = 0
+        while tests < most_tests and runs < most_runs and not self.stopped():
             if now.penalty == 0:
                 return now
-            done = max(step / closing, glances / looking)
-            heat = scale.hot * (scale.cold / scale.hot) ** done
-            value = scale.cost * now.energy + now.penalty + heat * self.rng.exponential()
+            done = max(tests / most_tests, runs / most_runs)
+            heat = objective.hot * (objective.cold / objective.hot) ** done
+            value = objective.energy * now.energy + now.penalty + heat * self.rng.exponential()
             assert now.tree is not None
-            if self.rng.random() < 0.05:
+            if self.rng.random() < _SAME_POSES:
                 pose, energy = now.pose, now.energy
             else:
-                focus = now.focus if self.rng.random() < scale.focus else _NOWHERE
-                found = self.neighbour(now.pose, value / scale.cost, 20, 10.0, focus)
+                focus = now.focus if self.rng.random() < _FOCUSED else _ANYWHERE
+                found = self.neighbour(now.pose, value / objective.energy, 20, _PIECE, focus)
                 if found is None:
-                    step += 1
+                    tests += 1
                     continue
                 pose, energy, _ = found
-            before = self.statistics.glances
-            fresh = self.judged(pose, energy, now, value - scale.cost * energy)
-            looked = self.statistics.glances - before
-            glances += looked
-            step += looked == 0
+            before = self.statistics.planner_runs
+            fresh = self.judged(pose, energy, now, value - objective.energy * energy)
+            new_runs = self.statistics.planner_runs - before
+            runs += new_runs
+            tests += new_runs == 0
             if fresh is not None:
                 now = fresh
         return now if now.penalty == 0 else None
@@ -292,7 +359,7 @@ class _Search:
                 break
             heat = hot * (cold / hot) ** (step / steps)
             value = now.energy + heat * self.rng.exponential()
-            found = self.neighbour(now.pose, value, 20, 10.0)
+            found = self.neighbour(now.pose, value, 20, _PIECE)
             if found is None:
                 continue
             fresh = self.judged(found[0], found[1], now, 0.0)
@@ -322,16 +389,20 @@ class _Search:
             return None
         return Candidate(fold_tree(self.problem, state.pose, state.tree), path, self.seed)
 
-    def gather(self) -> list[_State]:
+    def folding_states(self) -> list[_State]:
         """Trees that fold, from several starts, each polished for a moment."""
         effort, statistics = self.effort, self.statistics
         found: list[_State] = []
         for pose in grow(
-            self.problem, self.seed, beam=effort.beam, roots=effort.roots, stop=self.stopped
+            self.problem,
+            self.seed,
+            beam_width=effort.beam_width,
+            root_poses=effort.root_poses,
+            stop=self.stopped,
         ):
             statistics.grown += 1
-            self.tables = self.softened
-            start = self.hang_together(pose)
+            self.tables = self.phase_a_tables
+            start = self.make_joinable(pose)
             if start is not None:
                 statistics.starts += 1
                 folded = self.fold(start)
@@ -340,8 +411,8 @@ class _Search:
                     energy, _ = energy_of(self.tables, folded.pose, self.problem.empty_face)
                     folded = replace(folded, energy=energy)
                     self.keep(folded)
-                    found.append(self.polish(folded, effort.trying, 0.1, 0.02))
-            enough = effort.gathering if found else effort.restarts
+                    found.append(self.polish(folded, effort.polish_each, 0.1, 0.02))
+            enough = effort.starts if found else effort.restarts
             if statistics.starts >= enough or self.stopped():
                 break
         return found
@@ -349,14 +420,14 @@ class _Search:
     def run(self) -> list[Candidate]:
         """All the phases."""
         effort = self.effort
-        found = self.gather()
+        found = self.folding_states()
         if found:
             self.tables = self.problem.tables
-            self.polish(min(found, key=lambda s: s.energy), effort.polishing, 0.05, 0.005)
+            self.polish(min(found, key=lambda s: s.energy), effort.polish_best, 0.05, 0.005)
         if self.statistics.grown == 0:
             raise NoTreeError(
                 f"no tree found for {len(self.problem)} voxels in template "
-                f"{self.problem.template.name!r} from {effort.roots} root poses (seed "
+                f"{self.problem.template.name!r} from {effort.root_poses} root poses (seed "
                 f"{self.seed}): try other seeds, another voxelization or a larger template"
             )
         candidates = self.finished()
@@ -374,14 +445,18 @@ class _Search:
         out: list[Candidate] = []
         for state in sorted(self.results, key=lambda s: s.energy):
             assert state.tree is not None
-            if any(len(state.tree.keys ^ other.tree.keys) < 4 for other in chosen if other.tree):
+            if any(
+                len(state.tree.hinged_pairs ^ other.tree.hinged_pairs) < 4
+                for other in chosen
+                if other.tree
+            ):
                 continue
             candidate = self.candidate(state)
             if candidate is None:
                 continue
             chosen.append(state)
             out.append(candidate)
-            if len(out) == self.effort.keep:
+            if len(out) == self.effort.max_candidates:
                 break
         return out
 
@@ -395,7 +470,7 @@ def solve(
     report: Callable[[Candidate], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> list[Candidate]:
-    """Trees of rigid joints and half-turn hinges that fold, best first.
+    """Trees of rigid joints and hinges that fold, best first.
 
     Deterministic for the same problem, seed and effort. Phase A lowers the energy plus a penalty
     for hinges that cannot move and for what the planner leaves unresolved, until a tree folds;
@@ -404,10 +479,13 @@ def solve(
     Parameters
     ----------
     problem : TreeProblem
+        Voxels, joints and template.
     seed : int
-        Not negative.
+        Seed of every random choice; not negative.
     foldability : Foldability
+        Judges which trees fold.
     effort : Effort, optional
+        Budgets of the run; by default the normal ones.
     statistics : Statistics, optional
         Counts what was done.
     report : callable, optional

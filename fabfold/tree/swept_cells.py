@@ -1,4 +1,4 @@
-"""Which cells a turn about a lattice edge sweeps, as a cheap filter on hinges.
+"""Which hinges can turn at all: cells swept by a turn about a lattice edge, as a cheap filter.
 
 Two bodies that a hinge joins directly move against each other in one way only, so a hinge is
 useless when the child's turn would run through its parent, whatever else moves. With a link plate
@@ -23,11 +23,11 @@ from fabfold.tree.catalogue import edge_sides
 __all__ = [
     "REACH",
     "HingeTables",
-    "blocked",
     "double_blocked",
     "half_turn_table",
     "hinge_tables",
     "quarter_turn_table",
+    "single_blocked",
 ]
 
 #: Cells up to this far from the axis are tested; what lies beyond is left to the planner.
@@ -39,14 +39,15 @@ HALF_SIDE = 0.49
 def _overlap(
     moving: NDArray[np.float64], angle: float, still: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
+    """Whether the square about `moving`, turned by `angle` (radians), overlaps each of `still`."""
     # Separating axes of two unit squares, one of them turned.
     cosine, sine = np.cos(angle), np.sin(angle)
     turned = moving @ np.array([[cosine, sine], [-sine, cosine]])
-    apart = still - turned
+    offset = still - turned
     half = HALF_SIDE * (1.0 + abs(cosine) + abs(sine))
-    along = np.abs(apart).max(axis=1)
+    along = np.abs(offset).max(axis=1)
     across = np.maximum(
-        np.abs(apart @ np.array([cosine, sine])), np.abs(apart @ np.array([-sine, cosine]))
+        np.abs(offset @ np.array([cosine, sine])), np.abs(offset @ np.array([-sine, cosine]))
     )
     return np.asarray((along < half) & (across < half))
 
@@ -84,42 +85,54 @@ def quarter_turn_table() -> NDArray[np.bool_]:
 
 @cache
 def half_turn_table() -> NDArray[np.bool_]:
-    """As :func:`quarter_turn_table`, for a turn by +180 degrees."""
+    """Cells swept by a cell that turns by +180 degrees about the origin of the plane.
+
+    Returns
+    -------
+    (2 R, 2 R, 2 R, 2 R) bool array, R = :data:`REACH`
+        Indexed as :func:`quarter_turn_table`.
+    """
     quarter = quarter_turn_table()
     following = quarter[::-1].transpose(1, 0, 2, 3)
     return np.ascontiguousarray(quarter | following)
 
 
 class HingeTables(NamedTuple):
-    """What kernels must know of single hinges.
+    """What kernels must know of hinges on lattice edges.
 
     Attributes
     ----------
     faces : (6, 3) int32 array
-        ``FACES``.
+        The face normals, :data:`fabfold.lattice.rotations.FACES`.
     sides : (6, 4) int32 array
         ``FACES`` index of each edge of each face.
-    swept : bool array
+    half_turn : (2 R, 2 R, 2 R, 2 R) bool array
         :func:`half_turn_table`.
-    quarter : bool array
+    quarter_turn : (2 R, 2 R, 2 R, 2 R) bool array
         :func:`quarter_turn_table`.
     """
 
     faces: NDArray[np.int32]
     sides: NDArray[np.int32]
-    swept: NDArray[np.bool_]
-    quarter: NDArray[np.bool_]
+    half_turn: NDArray[np.bool_]
+    quarter_turn: NDArray[np.bool_]
 
 
 @cache
 def hinge_tables() -> HingeTables:
-    """The tables of hinges."""
+    """The tables of hinges, made once.
+
+    Returns
+    -------
+    HingeTables
+        The same object at every call.
+    """
     sides = np.array([edge_sides(face) for face in range(6)], dtype=np.int32)
     return HingeTables(np.ascontiguousarray(FACES), sides, half_turn_table(), quarter_turn_table())
 
 
 @njit(cache=True)
-def blocked(
+def single_blocked(
     source: NDArray[np.int32],
     parent_cells: NDArray[np.int32],
     child_cells: NDArray[np.int32],
@@ -133,14 +146,20 @@ def blocked(
     Parameters
     ----------
     source : (n, 3) int32 array
+        Cell of each voxel in shape A.
     parent_cells, child_cells : (a,), (b,) int32 arrays
-        Voxels of the two bodies.
+        Voxels of the two bodies, by number.
     at : (3,) int32 array
         Cell of the parent voxel that carries the hinge.
     d, n : (3,) int32 arrays
         Direction to the child voxel, and side of the hinge.
-    table : bool array
+    table : (2 R, 2 R, 2 R, 2 R) bool array
         :func:`half_turn_table` or :func:`quarter_turn_table`.
+
+    Returns
+    -------
+    bool
+        True where the hinge cannot turn.
     """
     reach = table.shape[0] // 2
     d_axis = 0 if d[0] != 0 else (1 if d[1] != 0 else 2)
@@ -192,6 +211,7 @@ def _turned(
 
 @njit(cache=True)
 def _holds(source: NDArray[np.int32], cells: NDArray[np.int32], place: NDArray[np.int32]) -> bool:
+    """Whether one of the voxels `cells` is at `place`."""
     for v in cells:
         if source[v, 0] == place[0] and source[v, 1] == place[1] and source[v, 2] == place[2]:
             return True
@@ -218,14 +238,25 @@ def double_blocked(
 
     Parameters
     ----------
-    source, parent_cells, child_cells, at, d
-        As for :func:`blocked`.
+    source : (n, 3) int32 array
+        Cell of each voxel in shape A.
+    parent_cells, child_cells : (a,), (b,) int32 arrays
+        Voxels of the two bodies, by number.
+    at : (3,) int32 array
+        Cell of the parent voxel that carries the hinge.
+    d : (3,) int32 array
+        Direction to the child voxel.
     n1, n2 : (3,) int32 arrays
         Sides of the parent's and of the child's axis.
     q1, q2 : int
         Their quarter turns, 1 to 3.
-    table : bool array
+    table : (2 R, 2 R, 2 R, 2 R) bool array
         :func:`quarter_turn_table`.
+
+    Returns
+    -------
+    bool
+        True where the hinge cannot turn.
     """
     ahead = at + d
     # Cells that the plate sweeps, quarter by quarter: against the parent, against the child.
@@ -268,9 +299,9 @@ def double_blocked(
             x = min(i, a)
             y = min(j, b)
             if a != i:
-                hit = blocked(cells, parent[x], child[j], at, d, n1, table)
+                hit = single_blocked(cells, parent[x], child[j], at, d, n1, table)
             else:
-                hit = blocked(cells, parent[i], child[y], at, d, n2, table)
+                hit = single_blocked(cells, parent[i], child[y], at, d, n2, table)
             if not hit:
                 seen[a, b] = True
                 stack[top, 0] = a

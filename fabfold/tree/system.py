@@ -34,7 +34,7 @@ class HingeSystem(NamedTuple):
     turns : (h,) int8 array
         Signed quarter turns about the positive axis from A to B.
     octants : (n, 2, 2, 2) bool array or None
-        Where voxels share cells of B: which eighths of each cell, in shape A, count as taken. None
+        Where voxels share cells of B: which octants of each cell, in shape A, count as taken. None
         where every voxel has a cell of its own; then whole cells count.
     """
 
@@ -48,7 +48,18 @@ class HingeSystem(NamedTuple):
 
 
 def hinge_system(tree: FoldTree) -> HingeSystem:
-    """Arrays of a :class:`~fabfold.tree.fold_tree.FoldTree` (its hinges run along +x, +y or +z)."""
+    """Arrays of a finished tree.
+
+    Parameters
+    ----------
+    tree : FoldTree
+        Its hinges run along +x, +y or +z.
+
+    Returns
+    -------
+    HingeSystem
+        The same bodies and hinges.
+    """
     directions = np.array([h.direction for h in tree.hinges], dtype=np.int32).reshape(-1, 3)
     axis = np.abs(directions).argmax(axis=1).astype(np.int8)
     sign = directions.sum(axis=1)

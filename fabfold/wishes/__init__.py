@@ -1,1 +1,1 @@
-"""What a maker may wish for, as terms of the search."""
+"""What a maker can ask for beyond a box that folds, each wish as a term of the tree search."""

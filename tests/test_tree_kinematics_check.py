@@ -12,7 +12,7 @@ from fabfold.tree.fold_tree import Body, Edge, FoldTree
 from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.solve import solve
 
-QUICK = Effort(polishing=50, restarts=10)
+QUICK = Effort(polish_best=50, restarts=10)
 
 
 @pytest.fixture(scope="module")

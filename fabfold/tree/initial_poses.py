@@ -1,4 +1,8 @@
-"""Full sets of poses from which the search for a tree that folds sets out."""
+"""Initial solutions of the tree search: full sets of poses, grown from random root poses.
+
+A root voxel gets a random pose, the beam places the others beside it, and
+:func:`fabfold.tree.large_neighbourhood.repair` places what the beam leaves over.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.lattice.rotations import parity
-from fabfold.tree.grow import fill_beam
+from fabfold.tree.beam import fill_beam
+from fabfold.tree.large_neighbourhood import repair
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.rng import generator
-from fabfold.tree.ruin import repair
 
 __all__ = ["grow"]
 
@@ -20,8 +24,8 @@ def grow(
     problem: TreeProblem,
     seed: int,
     *,
-    beam: int = 10,
-    roots: int = 400,
+    beam_width: int = 10,
+    root_poses: int = 400,
     repairs: int = 2000,
     stop: Callable[[], bool] | None = None,
 ) -> Iterator[NDArray[np.int32]]:
@@ -33,10 +37,12 @@ def grow(
     Parameters
     ----------
     problem : TreeProblem
+        Voxels, joints and template.
     seed : int
-    beam : int
-        States kept.
-    roots : int
+        Seed of every random choice; not negative.
+    beam_width : int
+        States that the beam keeps.
+    root_poses : int
         Root poses tried.
     repairs : int
         Removals tried to complete a set of poses.
@@ -59,8 +65,8 @@ def grow(
     colour = parity(problem.source)
     cells = [np.flatnonzero(parity(problem.template.cells) == c) for c in (0, 1)]
     count = len(problem)
-    out = np.empty((beam, count), np.int32)
-    for number in range(roots):
+    out = np.empty((beam_width, count), np.int32)
+    for number in range(root_poses):
         if stop is not None and stop():
             return
         # Double hinges grown freely leave pieces that no tree joins; they come in later. Every
@@ -74,9 +80,9 @@ def grow(
             start[root] = -1
             root, first = problem.roots[rng.integers(len(problem.roots))].tolist()
             start[root] = first
-        todo = np.flatnonzero(start < 0).astype(np.int32)
-        if len(todo):
-            fill_beam(tables, start, todo, beam, 0.3, 0.5, True, state, out)
+        unplaced = np.flatnonzero(start < 0).astype(np.int32)
+        if len(unplaced):
+            fill_beam(tables, start, unplaced, beam_width, 0.3, 0.5, True, state, out)
             start = out[0].copy()
         left, _ = repair(tables, start, repairs, 20, 12, state)
         if left == 0:

@@ -1,10 +1,11 @@
-"""Templates that fold once more: which voxels go into which part, and what that forbids.
+"""The tree search in a template that folds once more along its creases.
 
-A template with creases (:mod:`fabfold.lattice.creases`) is filled like any other, but two bodies in
-different parts may be joined across a crease only, by one hinge each, so that the crease can turn
-in the end. The voxels are therefore shared out before the search: each part gets a connected group
-of them, all joints between groups are forbidden but one pair of voxels for each crease, and these
-two stay rigid until the template is filled.
+Creases divide a template into parts (:mod:`fabfold.lattice.creases`), the panels of rigid origami.
+The template is filled like any other. But two bodies in different parts may be joined across a
+crease only, by one hinge for each crease, so that the crease can turn in the end. So the voxels are
+shared out before the search. Each part gets a connected group of them. All joints between groups
+are forbidden but one pair of voxels for each crease. These two stay rigid until the template is
+filled.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from fabfold.lattice.template import Template
 from fabfold.tree.problem import TreeProblem, cost_table
 from fabfold.tree.swept_cells import hinge_tables
 
-__all__ = ["parted"]
+__all__ = ["restrict_to_parts"]
 
 #: Energy of a voxel in a part that is not its own: far more than a whole tree has otherwise.
 MISPLACED = 100.0
@@ -33,7 +34,21 @@ _GROUPINGS = 24
 
 @dataclass(frozen=True)
 class _Cut:
-    """A pair of voxels on the two sides of a crease, and where they may stand."""
+    """A pair of voxels on the two sides of a crease.
+
+    Attributes
+    ----------
+    part : int
+        Part of the template that turns about the crease.
+    above : int
+        The voxel in the part that stays.
+    below : int
+        The voxel in the part that turns.
+    face : int
+        Face of `above` that `below` stands on, index in ``FACES``.
+    poses : (k,) int32 array
+        Poses that `above` may take.
+    """
 
     part: int
     above: int
@@ -42,13 +57,13 @@ class _Cut:
     poses: NDArray[np.int32]
 
 
-def parted(problem: TreeProblem, seed: int, depth: NDArray[np.float64]) -> TreeProblem:
-    """The problem with its voxels shared out among the parts of its template.
+def restrict_to_parts(problem: TreeProblem, seed: int, depth: NDArray[np.float64]) -> TreeProblem:
+    """Share the voxels of a problem out among the parts of its template.
 
     Parameters
     ----------
     problem : TreeProblem
-        Of a template with creases.
+        Its template has creases.
     seed : int
         Another seed shares the voxels out in another way.
     depth : (n, 6) float64 array
@@ -77,9 +92,9 @@ def parted(problem: TreeProblem, seed: int, depth: NDArray[np.float64]) -> TreeP
         group, cuts, roots = grouping
         found += 1
         # Pairs that are torn apart for good; the fewer, the more is left to choose from.
-        torn = _torn(problem, group)
-        if best is None or torn < best[0]:
-            best = (torn, group, cuts, roots)
+        separated = _separated_faces(problem, group)
+        if best is None or separated < best[0]:
+            best = (separated, group, cuts, roots)
         if found == _GROUPINGS:
             break
     if best is None:
@@ -93,7 +108,8 @@ def parted(problem: TreeProblem, seed: int, depth: NDArray[np.float64]) -> TreeP
     return _restricted(problem, parts, best[1], best[2], best[3], depth)
 
 
-def _torn(problem: TreeProblem, group: NDArray[np.int32]) -> int:
+def _separated_faces(problem: TreeProblem, group: NDArray[np.int32]) -> int:
+    """Faces of voxels, out of those with a possible joint, behind which another group lies."""
     neighbour = problem.tables.neighbour
     joined = neighbour >= 0
     return int((joined & (group[neighbour] != group[:, None])).sum())
@@ -139,8 +155,8 @@ def _grouping(
     count = len(problem)
     flip = int(rng.integers(2))
     colour = (parity(problem.source) + flip) % 2
-    room = np.zeros((len(parts.above), 2), dtype=int)
-    np.add.at(room, (parts.part, parity(problem.template.cells)), 1)
+    capacity = np.zeros((len(parts.above), 2), dtype=int)
+    np.add.at(capacity, (parts.part, parity(problem.template.cells)), 1)
     group = np.zeros(count, dtype=np.int32)
     alive = np.ones(count, dtype=bool)
     cuts: list[_Cut] = []
@@ -151,15 +167,15 @@ def _grouping(
             if alive[v] and parent[v] >= 0 and alive[parent[v]]:
                 size[parent[v]] += size[v]
         total = np.array([int((alive & (colour == c)).sum()) for c in (0, 1)])
-        rest = room[:part].sum(axis=0)
+        remaining = capacity[:part].sum(axis=0)
         options = []
         for v in range(count):
             u = int(parent[v])
             if not alive[v] or u < 0 or not alive[u]:
                 continue
             for below in (True, False):
-                mine = size[v] if below else total - size[v]
-                if (mine <= room[part]).all() and (total - mine <= rest).all():
+                inner = size[v] if below else total - size[v]
+                if (inner <= capacity[part]).all() and (total - inner <= remaining).all():
                     options.append((v, below))
         if not options:
             return None
@@ -170,9 +186,9 @@ def _grouping(
         for w in order:
             if parent[w] >= 0 and inside[parent[w]] and alive[w]:
                 inside[w] = True
-        mine_mask = alive & (inside if below else ~inside)
-        group[mine_mask] = part
-        alive &= ~mine_mask
+        members = alive & (inside if below else ~inside)
+        group[members] = part
+        alive &= ~members
         first, second, f = (u, v, int(face[v])) if below else (v, u, int(face[v]) ^ 1)
         poses = _poses(problem, parts, part, first, f, int(colour[first]))
         if len(poses) == 0:
@@ -180,8 +196,11 @@ def _grouping(
         cuts.append(_Cut(part, first, second, f, poses))
     if any(group[cut.above] != parts.above[cut.part] for cut in cuts):
         return None
-    stiff = problem.tables.stiff
-    if len(stiff) and (stiff & (group[problem.tables.neighbour] != group[:, None])).any():
+    always_rigid = problem.tables.always_rigid
+    if (
+        len(always_rigid)
+        and (always_rigid & (group[problem.tables.neighbour] != group[:, None])).any()
+    ):
         return None
     roots = _agreeing(problem, cuts)
     return None if len(roots) == 0 else (group, cuts, roots)
@@ -254,26 +273,29 @@ def _restricted(
     roots: NDArray[np.int32],
     depth: NDArray[np.float64],
 ) -> TreeProblem:
+    """The problem with the joints, poses and costs that a grouping of its voxels leaves."""
     tables, template = problem.tables, problem.template
     neighbour, allowed = tables.neighbour.copy(), tables.allowed.copy()
-    apart = (neighbour >= 0) & (group[neighbour] != group[:, None])
-    stiff = tables.stiff.copy() if len(tables.stiff) else np.zeros_like(apart)
+    separated = (neighbour >= 0) & (group[neighbour] != group[:, None])
+    always_rigid = (
+        tables.always_rigid.copy() if len(tables.always_rigid) else np.zeros_like(separated)
+    )
     for cut in cuts:
         for v, f in ((cut.above, cut.face), (cut.below, cut.face ^ 1)):
-            apart[v, f] = False
+            separated[v, f] = False
             allowed[v, f, 1:] = False
-            stiff[v, f] = True
-    neighbour[apart] = -1
-    allowed[apart] = False
+            always_rigid[v, f] = True
+    neighbour[separated] = -1
+    allowed[separated] = False
     # No joint leads from part to part, but for the rigid one at the places of the cuts.
-    step = tables.step.copy()
+    child_pose = tables.child_pose.copy()
     home = np.repeat(parts.part, 24)
-    step[(step >= 0) & (home[step] != home)] = -1
+    child_pose[(child_pose >= 0) & (home[child_pose] != home)] = -1
     for cut in cuts:
-        there = tables.step[cut.face, 0, cut.poses]
-        step[cut.face, 0, cut.poses] = there
-        step[cut.face ^ 1, 0, there] = cut.poses
-    cost, centre, shown = _shown_when_folded(problem, parts, depth)
+        there = tables.child_pose[cut.face, 0, cut.poses]
+        child_pose[cut.face, 0, cut.poses] = there
+        child_pose[cut.face ^ 1, 0, there] = cut.poses
+    cost, expected_cost, shown = _shown_when_folded(problem, parts, depth)
     own = parts.part[None, :] == group[:, None]
     cost += np.where(np.repeat(own, 24, axis=1), 0.0, MISPLACED).astype(np.float32)
     for cut in cuts:
@@ -285,19 +307,19 @@ def _restricted(
         tables=tables._replace(
             neighbour=neighbour,
             allowed=allowed,
-            step=step,
-            stiff=stiff,
-            hinged=_hinged(template, parts),
+            child_pose=child_pose,
+            always_rigid=always_rigid,
+            final_edge=_final_edge(template, parts),
             cost=cost,
-            centre=centre,
+            expected_cost=expected_cost,
             exposed=shown,
         ),
         roots=roots,
     )
 
 
-def _hinged(template: Template, parts: Parts) -> NDArray[np.int32]:
-    """Lattice edges of the flat template that hinges may lie on, see ``Tables.hinged``.
+def _final_edge(template: Template, parts: Parts) -> NDArray[np.int32]:
+    """Lattice edges of the flat template that hinges may lie on, see ``Tables.final_edge``.
 
     Those that two parts share are left to the creases. Edges of two parts that only meet in the
     folded shape have one number, so that one of them carries a hinge at most.
@@ -307,7 +329,7 @@ def _hinged(template: Template, parts: Parts) -> NDArray[np.int32]:
     number = np.arange(np.prod(2 * np.array(folded.shape) + 1), dtype=np.int32)
     number = number.reshape(2 * np.array(folded.shape) + 1)
     owner = np.full(2 * np.array(template.shape) + 1, -1, dtype=np.int32)
-    hinged = np.full(owner.shape, -1, dtype=np.int32)
+    final_edge = np.full(owner.shape, -1, dtype=np.int32)
     corners = [np.array([a, b]) for a in (-1, 1) for b in (-1, 1)]
     for cell, part in zip(template.cells, parts.part.tolist(), strict=True):
         pose = parts.poses[part]
@@ -322,8 +344,8 @@ def _hinged(template: Template, parts: Parts) -> NDArray[np.int32]:
                 landed = tuple(np.rint(turned + 1).astype(int).tolist())
                 if inside is not None:
                     free = free and bool(inside[landed])
-                hinged[at] = number[landed] if free else -1
-    return hinged
+                final_edge[at] = number[landed] if free else -1
+    return final_edge
 
 
 def _shown_when_folded(
@@ -343,6 +365,6 @@ def _shown_when_folded(
     after = cost_table(depth, shown, weight, None)
     return (
         problem.tables.cost + (after[0] - before[0]),
-        problem.tables.centre + (after[1] - before[1]),
+        problem.tables.expected_cost + (after[1] - before[1]),
         shown,
     )
