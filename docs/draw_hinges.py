@@ -264,7 +264,7 @@ def other_pictures() -> None:
 
 def example_pictures() -> None:
     """The examples."""
-    folder = Path(__file__).parents[1] / "examples" / "hinges"
+    folder = Path(__file__).parents[1] / "examples"
 
     def load(name: str) -> Any:
         spec = importlib.util.spec_from_file_location(name, folder / f"{name}.py")
@@ -274,17 +274,17 @@ def example_pictures() -> None:
         spec.loader.exec_module(module)
         return module
 
-    box, lid = load("01_lidded_box_build123d").main()
+    box, lid = load("07_lidded_box_build123d").main()
     upright = Camera(-55.0, 35.0)
-    rows = [("01: as printed", picture([box, lid], upright))]
+    rows = [("07: as printed", picture([box, lid], upright))]
     box.joints["hinge"].connect_to(lid.joints["hinge"], angle=120)
-    rows.append(("01: half closed", picture([box, lid], upright)))
-    base, back, link, lip = load("03_phone_stand_build123d").main()
+    rows.append(("07: half closed", picture([box, lid], upright)))
+    base, back, link, lip = load("09_phone_stand_build123d").main()
     base.joints["back"].connect_to(back.joints["back"], angle=103)
     base.joints["link"].connect_to(link.joints["parent"], angle=180)
     link.joints["child"].connect_to(lip.joints["link"], angle=0)
     bodies = bodies_of([base, back, link, lip], (PALETTE[0], PALETTE[1], PALETTE[2], PALETTE[3]))
-    rows.append(("03: in use", render(bodies, SIZE, Camera(-30.0, 20.0))))
+    rows.append(("09: in use", render(bodies, SIZE, Camera(-30.0, 20.0))))
     page("examples.png", rows)
 
 
