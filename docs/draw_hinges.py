@@ -321,7 +321,7 @@ def other_pictures() -> None:
 
 def example_pictures() -> None:
     """The examples."""
-    folder = Path(__file__).parents[1] / "examples" / "hinges"
+    folder = Path(__file__).parents[1] / "examples"
 
     def load(name: str) -> Any:
         spec = importlib.util.spec_from_file_location(name, folder / f"{name}.py")
@@ -331,18 +331,18 @@ def example_pictures() -> None:
         spec.loader.exec_module(module)
         return module
 
-    box, lid = load("01_lidded_box_build123d").main()
-    rows = [("01: as printed", picture([box, lid], UPRIGHT, y_up=False))]
+    box, lid = load("07_lidded_box_build123d").main()
+    rows = [("07: as printed", picture([box, lid], UPRIGHT, y_up=False))]
     box.joints["hinge"].connect_to(lid.joints["hinge"], angle=120)
-    rows.append(("01: half closed", picture([box, lid], UPRIGHT, y_up=False)))
-    base, back, link, lip = load("03_phone_stand_build123d").main()
+    rows.append(("07: half closed", picture([box, lid], UPRIGHT, y_up=False)))
+    base, back, link, lip = load("09_phone_stand_build123d").main()
     base.joints["back"].connect_to(back.joints["back"], angle=103)
     base.joints["link"].connect_to(link.joints["parent"], angle=180)
     link.joints["child"].connect_to(lip.joints["link"], angle=0)
     in_use = [base, back, link, lip]
     view = replace(UPRIGHT, azimuth_deg=-30.0, elevation_deg=20.0)
     colors = (BLUE, ORANGE, GREEN, GREY)
-    rows.append(("03: in use", picture(in_use, view, colors, y_up=False)))
+    rows.append(("09: in use", picture(in_use, view, colors, y_up=False)))
     page("examples.png", rows)
 
 

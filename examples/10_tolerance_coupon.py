@@ -1,6 +1,6 @@
 """A tolerance coupon with clearances of your own choice.
 
-Run it with a folder to write to: ``python 04_tolerance_coupon.py out``.
+Run it with a folder to write to: ``python 10_tolerance_coupon.py out``.
 """
 
 import sys

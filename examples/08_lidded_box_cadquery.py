@@ -1,6 +1,6 @@
-"""The lidded box of example 01, in CadQuery.
+"""The lidded box of example 07, in CadQuery.
 
-Run it with a folder to write to: ``python 02_lidded_box_cadquery.py out``.
+Run it with a folder to write to: ``python 08_lidded_box_cadquery.py out``.
 """
 
 import sys

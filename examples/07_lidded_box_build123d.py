@@ -1,7 +1,7 @@
 """A lidded box that prints in one piece, in build123d.
 
 Box and lid stand open, side by side on the bed. Run it with a folder to write to:
-``python 01_lidded_box_build123d.py out``.
+``python 07_lidded_box_build123d.py out``.
 """
 
 import sys

@@ -2,7 +2,7 @@
 
 The back turns up from flat and its stop holds it at 70° over the base. The lip hangs on a link
 plate: turned over it stands on the base and keeps the phone from sliding, turned under it lifts the
-base's front. Run it with a folder to write to: ``python 03_phone_stand_build123d.py out``.
+base's front. Run it with a folder to write to: ``python 09_phone_stand_build123d.py out``.
 """
 
 import sys

@@ -1,0 +1,156 @@
+"""The examples run as a reader runs them, and what they write is what they say."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fabfold import Motion, load_profile, load_template, read_recipe
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
+
+
+def run(name, *arguments, cwd, code=0):
+    """What an example says that is run in a folder of its own."""
+    result = subprocess.run(
+        [sys.executable, ROOT / "examples" / f"{name}.py", *map(str, arguments)],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"},
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+    assert result.returncode == code, result.stderr
+    return result.stdout + result.stderr
+
+
+def read(path):
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def check_kit(folder):
+    """What holds of every kit: it fits its template, and all its checks pass."""
+    tree, motion = read(folder / "tree.json"), read(folder / "motion.json")
+    assert len(list((folder / "bodies").glob("*.stl"))) == len(tree["bodies"])
+    assert len(tree["bodies"]) == len(tree["hinges"]) + 1
+    cells = {tuple(cell) for cell in tree["template"]["cells"]}
+    assert {tuple(cell) for cell in tree["target"]} <= cells
+    assert all(check["ok"] for check in read(folder / "report.json")["checks"])
+    assert motion["certificate"]["min_gap_mm"] > 0.0
+    return tree, motion
+
+
+@pytest.fixture(scope="module")
+def car(tmp_path_factory):
+    """Folder that example 01 was run in, and what it said."""
+    home = tmp_path_factory.mktemp("car")
+    return home, run("01_fold_a_sample", cwd=home)
+
+
+def test_examples_are_numbered_and_all_in_the_table():
+    assert [path.name[:2] for path in EXAMPLES] == [f"{i:02d}" for i in range(1, len(EXAMPLES) + 1)]
+    table = (ROOT / "examples" / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"\]\((\d\d_\w+\.py)\)", table) == [path.name for path in EXAMPLES]
+
+
+@pytest.mark.slow
+def test_01_folds_a_sample(car):
+    home, said = car
+    tree, motion = check_kit(home / "car-kit")
+    assert tree["template"]["name"] == "box-3x4x4"
+    assert f"{len(tree['bodies'])} bodies hang on {len(tree['hinges'])} hinges" in said
+    assert f"It folds in {len(motion['keyframes']) - 1} moves" in said
+    assert (home / "car-kit" / "car.3mf").is_file()
+
+
+@pytest.mark.slow
+def test_05_reads_a_kit_without_fabfold(car):
+    home, _ = car
+    source = (ROOT / "examples" / "05_read_a_kit.py").read_text(encoding="utf-8")
+    assert "import fabfold" not in source
+    assert "from fabfold" not in source
+    said = run("05_read_a_kit", home / "car-kit", cwd=home).splitlines()
+    frames = read(home / "car-kit" / "motion.json")["keyframes"]
+    assert len(said) == len(frames) + 2
+    sizes = [
+        tuple(map(int, re.findall(r"(\d+) x (\d+) x (\d+) mm", line)[0])) for line in said[:-2]
+    ]
+    assert sizes[-1] == (60, 80, 80)
+    assert sizes[0] != sizes[-1]
+    assert "voxels end in their cells of box-3x4x4" in said[-1]
+
+
+@pytest.mark.slow
+def test_05_finds_a_voxel_that_ends_elsewhere(car, tmp_path):
+    kit = car[0] / "car-kit"
+    tree = read(kit / "tree.json")
+    tree["target"][5][0] += 1
+    (tmp_path / "tree.json").write_text(json.dumps(tree), encoding="utf-8")
+    (tmp_path / "motion.json").write_bytes((kit / "motion.json").read_bytes())
+    said = run("05_read_a_kit", tmp_path, cwd=tmp_path, code=1)
+    assert "is 1.0e+00 voxel sides away" in said
+    assert "does not fold into its template" in said
+
+
+@pytest.mark.slow
+def test_02_cuts_a_model_by_hand(tmp_path):
+    said = run("02_own_model", cwd=tmp_path)
+    tree, _ = check_kit(tmp_path / "robot-kit")
+    assert "The robot is 16 voxels, 100% full." in said
+    head = max(tree["source"], key=lambda cell: cell[2])
+    assert head[2] == 4
+    assert len(tree["target"]) == 16
+    recipe = read_recipe(tmp_path / "robot-kit" / "kit.toml")
+    assert (recipe.rotation, recipe.pitch) == ((0.0, 0.0, -30.0), 10.0)
+
+
+@pytest.mark.slow
+def test_03_folds_into_a_template_from_a_file(tmp_path):
+    run("03_own_template", cwd=tmp_path)
+    tree, _ = check_kit(tmp_path / "stairs-kit")
+    stairs = load_template(str(tmp_path / "stairs.toml"))
+    heights = np.zeros(stairs.shape[:2], int)
+    for i, j, _ in stairs.cells:
+        heights[i, j] += 1
+    assert heights.tolist() == [[3, 3], [2, 2], [1, 1]]
+    assert sorted(map(tuple, tree["target"])) == sorted(map(tuple, stairs.cells.tolist()))
+    assert np.ptp(tree["source"], axis=0).tolist() == [11, 0, 0]
+
+
+@pytest.mark.slow
+def test_04_calibrates_a_printer(tmp_path):
+    said = run("04_own_printer", cwd=tmp_path)
+    home = tmp_path / "my-printer"
+    profile = load_profile(str(home / "my-printer.toml"))
+    assert (profile.clearance_mm, profile.min_gap_mm) == (0.4, 0.35)
+    assert "clearance_mm = 0.4" in said
+    check_kit(home / "bar-kit")
+    motion = Motion.from_json(read(home / "bar-kit" / "motion.json"))
+    assert motion.certificate["min_gap_mm"] >= 0.35
+    assert (home / "coupon.3mf").is_file()
+
+
+@pytest.mark.slow
+def test_06_takes_the_best_of_several_seeds(tmp_path):
+    said = run("06_seeds_on_a_cluster", cwd=tmp_path)
+    found = {
+        int(seed): float(energy) for seed, energy in re.findall(r"seed (\d): .* energy (.*)", said)
+    }
+    assert len(found) == 3
+    (kit,) = (tmp_path / "seeds").glob("bar-kit-*")
+    assert found[int(kit.name[-1])] == min(found.values())
+    tree, _ = check_kit(kit)
+    assert tree["energy"]["total"] == pytest.approx(min(found.values()), abs=0.005)
+
+
+@pytest.mark.parametrize("name", ["07_lidded_box_build123d", "09_phone_stand_build123d"])
+def test_hinge_examples_write_step(name, tmp_path):
+    run(name, "out", cwd=tmp_path)
+    (path,) = (tmp_path / "out").iterdir()
+    assert path.suffix == ".step"
