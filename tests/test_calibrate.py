@@ -1,6 +1,6 @@
 import pytest
 import trimesh
-from hinges.coupon import DEFAULT_CLEARANCES
+from hinges.tolerance_coupon import DEFAULT_CLEARANCES
 from typer.testing import CliRunner
 
 from fabfold.cli.app import app
