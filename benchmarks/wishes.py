@@ -16,8 +16,8 @@ from fabfold.export.sketch import picture_of_tree
 from fabfold.files import write_bytes
 from fabfold.kit.kit import Kit
 from fabfold.lattice.rotations import FACES
-from fabfold.solid.regions import area_of, parse_shape, region_of
-from fabfold.voxels.region_cells import owners
+from fabfold.solid.regions import parse_region, sample_region, sample_surface
+from fabfold.voxels.region_cells import containing_voxels
 from fabfold.wishes.terms import Keep, Wishes
 
 #: Axles and tracks of the sample's wheels.
@@ -49,12 +49,12 @@ def main() -> None:
         kit = Kit.from_model("sample:car", effort="quick", seed=1, **wishes)
         attempt = kit.fold()
         tree, voxels, solid = attempt.tree, attempt.voxels, kit.solid()
-        keep = Keep(FRONT, area_of(solid, 0), int((FACES == [1, 0, 0]).all(axis=1).argmax()))
+        keep = Keep(FRONT, sample_surface(solid, 0), int((FACES == [1, 0, 0]).all(axis=1).argmax()))
         (kept,) = Wishes(keeps=(keep,)).kept(voxels, tree)
         parts = []
         for text in WHEELS:
-            (points,) = region_of(solid, parse_shape(text, "wheel")).pieces
-            holder = owners(voxels, points)
+            (points,) = sample_region(solid, parse_region(text, "wheel")).pieces
+            holder = containing_voxels(voxels, points)
             body = tree.voxel_body[holder[holder >= 0]]
             parts.append(sum((body == b).mean() >= 0.01 for b in set(body.tolist())))
         surface = tree.energy["surface"]

@@ -21,15 +21,17 @@ import trimesh
 from export_kits import ROW, VOXEL_MM, row_joinery, row_motion, row_tree
 
 from fabfold.errors import GeometryError
-from fabfold.export.colours import _oklab, body_colours, hex_colour, palette
+from fabfold.export.colours import _oklab, body_colours, palette
 from fabfold.export.glb import keyframe_times, write_glb
 from fabfold.export.report import write_report
 from fabfold.export.shading import corner_normals, split_vertices
 from fabfold.export.stl import write_stl
 from fabfold.export.threemf import posed, write_3mf
-from fabfold.export.weld import is_closed, printable_mesh, weld
+from fabfold.export.weld import printable_mesh, weld_rounded
 from fabfold.joinery.bodies import BodyMesh
+from fabfold.meshes import is_closed
 from fabfold.printing.checks import Check
+from fabfold.srgb import hex_of_colour
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +51,7 @@ def _mesh(solid: m3.Manifold) -> tuple[np.ndarray, np.ndarray]:
 def test_weld_joins_what_rounds_to_one_point():
     vertices, faces = _mesh(m3.Manifold.cube((1, 1, 1)))
     soup = vertices[faces].reshape(-1, 3) + np.linspace(0, 1e-5, 36)[:, None]
-    points, triangles = weld(soup, np.arange(36, dtype=np.int32).reshape(-1, 3), 3)
+    points, triangles = weld_rounded(soup, np.arange(36, dtype=np.int32).reshape(-1, 3), 3)
     assert len(points) == 8
     assert len(triangles) == 12
     assert is_closed(triangles)
@@ -69,7 +71,7 @@ def test_printable_mesh_closes_a_sliver_that_rounding_pinches():
     # Two blocks a tenth of a nanometre apart but joined elsewhere: rounding closes the slit.
     slit = m3.Manifold.cube((10, 10, 10)) - m3.Manifold.cube((5, 1e-7, 20)).translate((-1, 5, -5))
     vertices, faces = _mesh(slit)
-    assert not is_closed(weld(vertices, faces)[1])
+    assert not is_closed(weld_rounded(vertices, faces)[1])
     points, triangles = printable_mesh(BodyMesh("body-00", vertices, faces))
     assert is_closed(triangles)
     assert points.dtype == np.float32
@@ -341,7 +343,7 @@ def test_palette_colours_differ_and_do_not_change_with_their_number():
     apart = np.linalg.norm(lab[:, None] - lab[None], axis=2) + np.eye(64)
     assert apart.min() > 0.05
     assert np.array_equal(palette(20), colours[:20])
-    assert hex_colour(colours[0]) == "#4E8FD6"
+    assert hex_of_colour(colours[0].tolist()) == "#4e8fd6"
     assert palette(0).shape == (0, 3)
 
 

@@ -20,9 +20,8 @@ from fabfold.export.step import write_step
 from fabfold.export.steptext import _string
 from fabfold.export.surfaces import Axis, Plane, Round, flat_regions, round_regions
 from fabfold.export.thin import thinned
-from fabfold.export.weld import is_closed
 from fabfold.joinery.bodies import BodyMesh, Joinery
-from fabfold.meshes import mesh_volume
+from fabfold.meshes import is_closed, mesh_volume
 
 
 def _mesh(solid: m3.Manifold) -> tuple[np.ndarray, np.ndarray]:

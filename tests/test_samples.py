@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from fabfold.errors import ModelError
 from fabfold.lattice.shipped import load_template
+from fabfold.meshes import is_closed
 from fabfold.samples.catalogue import build_sample, load_model, sample, sample_names, solid_of
 from fabfold.solid.closed_solid import Solid
-from fabfold.solid.scan import occupancy
+from fabfold.solid.convert import to_manifold
+from fabfold.solid.scan import scan_mesh
 
 
 @functools.cache
@@ -47,10 +50,10 @@ def test_mesh_is_the_drawn_solid(name: str) -> None:
     assert len(part.solids()) == 1
     assert part.label == name
     result = loaded(name)
-    manifold = result.to_manifold()
+    manifold = to_manifold(result.vertices, result.faces)
     assert manifold.status() == manifold3d.Error.NoError
     assert len(manifold.decompose()) == 1
-    assert result.to_trimesh().is_watertight
+    assert is_closed(result.faces)
     assert result.notes == ()
     assert result.volume == pytest.approx(part.volume, rel=0.01)
     box = part.bounding_box()
@@ -64,7 +67,7 @@ def test_stands_on_the_ground_and_is_symmetric(name: str) -> None:
     low, high = result.bounds
     assert abs(low[2]) < 0.6
     assert low[1] == pytest.approx(-high[1], abs=0.05)
-    mesh = result.to_trimesh()
+    mesh = trimesh.Trimesh(result.vertices, result.faces, process=False)
     assert abs(mesh.center_mass[1]) < 0.01 * (high[1] - low[1])
     # The middle of mass stands over the feet.
     feet = result.vertices[result.vertices[:, 2] < low[2] + 3]
@@ -84,7 +87,7 @@ def test_is_chunky_enough_for_its_box(name: str) -> None:
     corner = result.bounds.mean(axis=0) - (reach + 0.5) * pitch
     count = 2 * reach + 1
     x, y, z = (fine * count).tolist()
-    inside = occupancy((result.vertices - corner) * fine / pitch, result.faces, (x, y, z))
+    inside = scan_mesh((result.vertices - corner) * fine / pitch, result.faces, (x, y, z))
     cubes = inside.reshape(count[0], fine, count[1], fine, count[2], fine)
     touched = int((cubes.mean(axis=(1, 3, 5)) > 0.02).sum())
     assert touched < 1.6 * cells

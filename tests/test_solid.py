@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from fabfold.errors import ModelError
+from fabfold.meshes import is_closed
 from fabfold.solid.closed_solid import Solid
+from fabfold.solid.convert import to_manifold
 from fabfold.solid.load import load_solid, solid_from_mesh
 from fabfold.solid.raw import RawMesh
 
@@ -71,12 +73,12 @@ def is_sound(result: Solid) -> bool:
     """Closed, outward, and accepted by Manifold without a change."""
     import manifold3d
 
-    manifold = result.to_manifold()
+    manifold = to_manifold(result.vertices, result.faces)
     return (
         manifold.status() == manifold3d.Error.NoError
         and manifold.num_tri() == len(result.faces)
         and manifold.volume() > 0
-        and result.to_trimesh().is_watertight
+        and is_closed(result.faces)
         and len(manifold.decompose()) == 1
     )
 

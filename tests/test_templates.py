@@ -4,6 +4,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
+import trimesh
 from tree_cases import solid_problem, strip
 
 from fabfold.errors import ModelError, NoTreeError, RecipeError, TemplateError
@@ -60,7 +61,7 @@ def blocks(*boxes):
 
 
 def write_stl(path, solid):
-    solid.to_trimesh().export(path)
+    trimesh.Trimesh(solid.vertices, solid.faces, process=False).export(path)
     return path
 
 

@@ -2,12 +2,13 @@
 
 import itertools
 
+import manifold3d
 import numpy as np
 import pytest
 import trimesh
 
-from fabfold.solid.closed_solid import Solid
-from fabfold.solid.scan import box_counts, occupancy, summed_volume
+from fabfold.solid.convert import to_manifold
+from fabfold.solid.scan import box_counts, scan_mesh, summed_volume
 from fabfold.voxels.offsets import CellEnergy, best_axis_offsets, cell_energy, optimise_offsets
 from fabfold.voxels.warp import split_at_plane, warp_mesh
 
@@ -44,7 +45,7 @@ def test_scan_of_a_turned_box_is_its_inside(seed):
     half = np.array([9.0, 6.0, 4.0])
     vertices, faces = mesh_arrays(trimesh.creation.box(2 * half))
     shape = (30, 30, 30)
-    grid = occupancy(vertices @ rotation.T + 15.0, faces, shape)
+    grid = scan_mesh(vertices @ rotation.T + 15.0, faces, shape)
     local = np.abs((centres(shape) - 15.0) @ rotation)
     assert np.array_equal(grid, (local < half).all(axis=-1))
 
@@ -52,15 +53,15 @@ def test_scan_of_a_turned_box_is_its_inside(seed):
 def test_faces_edges_and_corners_on_sample_lines_do_not_leak():
     # Every corner of the box and the diagonal of every face runs through sample lines.
     vertices, faces = mesh_arrays(trimesh.creation.box((4, 4, 4)))
-    grid = occupancy(vertices + 4.5, faces, (10, 10, 10))
+    grid = scan_mesh(vertices + 4.5, faces, (10, 10, 10))
     assert grid.sum() == 64
-    assert occupancy(vertices + 4.5 + 1e-9, faces, (10, 10, 10)).sum() == 64
+    assert scan_mesh(vertices + 4.5 + 1e-9, faces, (10, 10, 10)).sum() == 64
 
 
 def test_sphere_volume_and_sub_pixel_triangles():
     sphere = trimesh.creation.icosphere(subdivisions=6, radius=12.0)
     vertices, faces = mesh_arrays(sphere)
-    grid = occupancy(vertices + 15.0, faces, (30, 30, 30))
+    grid = scan_mesh(vertices + 15.0, faces, (30, 30, 30))
     assert grid.sum() == pytest.approx(sphere.volume, rel=5e-3)
 
 
@@ -68,22 +69,22 @@ def test_overlapping_shells_are_solid_and_cavities_are_not():
     outer = trimesh.creation.box((8, 8, 8))
     inner = trimesh.creation.box((4, 4, 4))
     shell, faces = mesh_arrays(trimesh.util.concatenate([outer, inner]))
-    assert occupancy(shell + 5.0, faces, (10, 10, 10)).sum() == 512
+    assert scan_mesh(shell + 5.0, faces, (10, 10, 10)).sum() == 512
     inner.invert()
     cavity, faces = mesh_arrays(trimesh.util.concatenate([outer, inner]))
-    assert occupancy(cavity + 5.0, faces, (10, 10, 10)).sum() == 512 - 64
+    assert scan_mesh(cavity + 5.0, faces, (10, 10, 10)).sum() == 512 - 64
 
 
 def test_a_mesh_that_reaches_out_of_the_grid_is_cut_off():
     vertices, faces = mesh_arrays(trimesh.creation.box((20, 20, 20)))
-    assert occupancy(vertices, faces, (5, 6, 7)).all()
+    assert scan_mesh(vertices, faces, (5, 6, 7)).all()
 
 
 def test_summed_volume_table_counts_boxes():
     vertices, faces = mesh_arrays(trimesh.creation.torus(8.0, 3.0))
     shape = (24, 24, 8)
     centred = vertices + np.array(shape) / 2
-    grid = occupancy(centred, faces, shape)
+    grid = scan_mesh(centred, faces, shape)
     table = summed_volume(centred, faces, shape)
     assert table[-1, -1, -1] == grid.sum()
     planes = tuple(np.array([-3, 0, 5, 7, n, n + 4], dtype=np.int64) for n in shape)
@@ -210,7 +211,6 @@ def test_split_through_vertices_adds_no_needless_triangle():
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("shape", ["torus", "sphere", "box"])
 def test_warp_scales_the_piece_in_every_cell_exactly(seed, shape):
-    manifold3d = pytest.importorskip("manifold3d")
     mesh = {
         "torus": lambda: trimesh.creation.torus(1.6, 0.7),
         "sphere": lambda: trimesh.creation.icosphere(subdivisions=2, radius=2.2),
@@ -222,8 +222,8 @@ def test_warp_scales_the_piece_in_every_cell_exactly(seed, shape):
     warped, pieces = warp_mesh(vertices, faces, moved, regular)
     assert closed_and_oriented(warped, pieces)
 
-    before = Solid("before", vertices, faces).to_manifold()
-    after = Solid("after", warped, pieces).to_manifold()
+    before = to_manifold(vertices, faces)
+    after = to_manifold(warped, pieces)
     assert after.status() == manifold3d.Error.NoError
     checked = 0
     for cell in itertools.product(range(1, 5), repeat=3):

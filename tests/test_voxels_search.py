@@ -14,15 +14,15 @@ from fabfold.solid.scan import summed_volume
 from fabfold.voxels.features import RIGID_CONTACT, features
 from fabfold.voxels.grid_placement import (
     Capacity,
+    grid_fit,
     grid_rotations,
-    judge,
     nearby_rotations,
     rank_translations,
 )
 from fabfold.voxels.offsets import CellEnergy
 from fabfold.voxels.voxel_files import save_voxels
 from fabfold.voxels.voxel_model import Voxels
-from fabfold.voxels.voxelize import shares_of, voxelize
+from fabfold.voxels.voxelize import fill_shares, voxelize
 
 QUICK = {"placements": 12, "shortlist": 4, "results": 3}
 
@@ -129,15 +129,15 @@ def test_results_are_different_and_of_several_sizes():
         check(voxels, template)
     # One for each share of the 14 + 13 cells, which are 1, 0.95, 0.9 and 0.85.
     sizes = sorted(len(voxels) for voxels in results)
-    most = [int(share * 14) + int(share * 13) for share in shares_of(27)[::-1]]
+    most = [int(share * 14) + int(share * 13) for share in fill_shares(27)[::-1]]
     assert most == [22, 23, 25, 27]
     assert all(size <= limit for size, limit in zip(sizes, most, strict=True))
 
 
 def test_larger_templates_are_left_emptier():
-    assert shares_of(8) == (1.0,)
-    assert shares_of(64) == pytest.approx((1.0, 14 / 15, 13 / 15, 0.8))
-    least = [shares_of(cells)[-1] for cells in (64, 125, 216, 512)]
+    assert fill_shares(8) == (1.0,)
+    assert fill_shares(64) == pytest.approx((1.0, 14 / 15, 13 / 15, 0.8))
+    least = [fill_shares(cells)[-1] for cells in (64, 125, 216, 512)]
     assert least == pytest.approx([0.8, 0.75, 0.7, 0.6])
 
 
@@ -287,18 +287,18 @@ def test_nearby_rotations_are_small_turns():
 def test_judge_drops_crumbs_islands_and_surplus_colour():
     fills = np.zeros((6, 1, 1))
     fills[:, 0, 0] = [1.0, 0.9, 0.02, 0.0, 0.5, 0.05]
-    verdict = judge(fills, CellEnergy(), Capacity(4, (2, 2)))
-    assert (verdict.kept, verdict.slivers, verdict.excess) == (2, 0, 0)
-    assert verdict.fill == pytest.approx(1.9)
-    assert verdict.lost == pytest.approx(0.57)
-    assert verdict.fills.tolist() == [0.9, 1.0]
+    fit = grid_fit(fills, CellEnergy(), Capacity(4, (2, 2)))
+    assert (fit.kept, fit.slivers, fit.excess) == (2, 0, 0)
+    assert fit.fill == pytest.approx(1.9)
+    assert fit.lost == pytest.approx(0.57)
+    assert fit.fills.tolist() == [0.9, 1.0]
     # Three cells, two of one colour, one place for it: the small end cell goes.
     row = np.array([0.8, 0.9, 0.12]).reshape(3, 1, 1)
-    verdict = judge(row, CellEnergy(), Capacity(2, (1, 1)))
-    assert (verdict.kept, verdict.excess) == (2, 0)
+    fit = grid_fit(row, CellEnergy(), Capacity(2, (1, 1)))
+    assert (fit.kept, fit.excess) == (2, 0)
     # Nothing small enough to go: too many.
     row = np.array([0.8, 0.9, 0.3]).reshape(3, 1, 1)
-    assert judge(row, CellEnergy(), Capacity(2, (1, 1))).excess == 1
+    assert grid_fit(row, CellEnergy(), Capacity(2, (1, 1))).excess == 1
 
 
 def test_ranked_translations_agree_with_judge():
@@ -315,7 +315,7 @@ def test_ranked_translations_agree_with_judge():
         x, y, z = (4 * step for step in shift)
         grid[x : x + 34, y : y + 34, z : z + 10] = full
         fills = grid.reshape(6, 8, 6, 8, 3, 8).mean(axis=(1, 3, 5))
-        verdict = judge(fills, CellEnergy(), capacity)
-        assert rows[row, 1] == verdict.kept
-        assert rows[row, 2] == verdict.excess
-        assert rows[row, 3] == pytest.approx(verdict.lost / (verdict.lost + verdict.fill))
+        fit = grid_fit(fills, CellEnergy(), capacity)
+        assert rows[row, 1] == fit.kept
+        assert rows[row, 2] == fit.excess
+        assert rows[row, 3] == pytest.approx(fit.lost / (fit.lost + fit.fill))

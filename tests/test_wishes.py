@@ -22,14 +22,20 @@ from fabfold.recipe.recipe_wishes import make_wishes, weights_of, wished
 from fabfold.search.rounds import _usable
 from fabfold.solid.load import load_solid, solid_from_mesh
 from fabfold.solid.raw import RawMesh
-from fabfold.solid.regions import area_of, face_named, parse_keep, parse_shape, region_of
+from fabfold.solid.regions import (
+    parse_keep,
+    parse_region,
+    parse_side,
+    sample_region,
+    sample_surface,
+)
 from fabfold.store import StageStore
 from fabfold.tree.effort import EFFORTS
 from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.problem import Weights, from_features, tree_problem
 from fabfold.tree.solve import solve
 from fabfold.voxels.features import features
-from fabfold.voxels.region_cells import owners, to_lattice
+from fabfold.voxels.region_cells import containing_voxels, to_lattice
 from fabfold.voxels.voxelize import voxelize
 from fabfold.wishes.terms import Keep, Wishes, hinges_outside, rank_by_cuts, uncut_pairs
 
@@ -78,7 +84,7 @@ def search(voxels, template, wishes, seed=0):
 )
 def test_regions_that_cannot_be_read(text, part):
     with pytest.raises(RecipeError, match=part):
-        parse_shape(text, "--protect")
+        parse_region(text, "--protect")
 
 
 def test_recipe_refuses_wishes_it_cannot_read():
@@ -121,11 +127,11 @@ def test_words_are_numbers_and_move_the_weights():
 
 def test_region_that_does_not_touch_the_model():
     with pytest.raises(RecipeError, match="no material"):
-        region_of(bar(), parse_shape("sphere(20,0,0,3)", "--protect"))
+        sample_region(bar(), parse_region("sphere(20,0,0,3)", "--protect"))
 
 
 def test_shares_of_the_extent():
-    region = region_of(bar(), parse_shape("box(50%,0%,0%,100%,100%,50%)", "--protect"))
+    region = sample_region(bar(), parse_region("box(50%,0%,0%,100%,100%,50%)", "--protect"))
     (points,) = region.pieces
     assert points[:, 0].min() > 4.0
     assert points[:, 2].max() < 1.0
@@ -135,12 +141,12 @@ def test_points_follow_the_grid():
     turn = rotation_about(np.zeros(3), np.array([0, 0, 1]), 90.0)[:3, :3]
     voxels = cut(bar(), "box-4x4x2", turn)
     inside = np.array([[7.5, 0.5, 1.5], [0.5, 1.5, 0.5]])
-    cells = voxels.cells[owners(voxels, inside)]
+    cells = voxels.cells[containing_voxels(voxels, inside)]
     wanted = np.rint(to_lattice(voxels, inside)).astype(int)
     assert (cells == wanted).all()
-    assert owners(voxels, np.array([[9.0, 0.5, 0.5]])) == [-1]
+    assert containing_voxels(voxels, np.array([[9.0, 0.5, 0.5]])) == [-1]
     # The grid lies across: the front (-y) of the model is on a lattice face of x.
-    keep = Keep("front:+x", area_of(bar(), face_named("front", "")), 0)
+    keep = Keep("front:+x", sample_surface(bar(), parse_side("front", "")), 0)
     share, whole = keep.by_voxel(voxels)
     face = int(np.flatnonzero((turn @ [0, -1, 0] == FACES).all(axis=1))[0])
     assert whole == pytest.approx(16.0, rel=0.03)
@@ -151,7 +157,7 @@ def test_points_follow_the_grid():
 def test_protected_voxels_are_one_body():
     solid = bar()
     voxels = cut(solid, "box-4x4x2")
-    region = region_of(solid, parse_shape("sphere(4,1,1,1.05)", "--protect"))
+    region = sample_region(solid, parse_region("sphere(4,1,1,1.05)", "--protect"))
     wishes = Wishes(regions=(region,))
     plain = [search(voxels, "box-4x4x2", Wishes(), seed)[0] for seed in range(4)]
     before = [wishes.report(voxels, tree)[0]["share"] for tree in plain]
@@ -168,7 +174,7 @@ def test_protected_voxels_are_one_body():
 def test_protected_region_too_long_for_the_template():
     solid = bar()
     voxels = cut(solid, "box-4x4x2")
-    region = region_of(solid, parse_shape("box(1,0,0,7,2,2)", "--protect"))
+    region = sample_region(solid, parse_region("box(1,0,0,7,2,2)", "--protect"))
     with pytest.raises(NoTreeError, match="fit template 'box-4x4x2' nowhere"):
         rank_by_cuts(
             Wishes(regions=(region,)), [(voxels, features(voxels))], load_template("box-4x4x2")
@@ -187,14 +193,14 @@ def test_protected_region_held_by_too_little():
     found = features(voxels)
     weak = replace(found, rigid=np.array([True, False, True]))
     solid = bar(4, 1, 1)
-    region = region_of(solid, parse_shape("box(1.2,0,0,2.8,1,1)", "--protect"))
+    region = sample_region(solid, parse_region("box(1.2,0,0,2.8,1,1)", "--protect"))
     with pytest.raises(NoTreeError, match="cannot be printed as one piece"):
         Wishes(regions=(region,)).uncut(voxels, weak, load_template("box-4x1x1"))
 
 
 def test_grids_with_few_cuts_come_first():
     solid = bar()
-    region = region_of(solid, parse_shape("sphere(4.5,0.5,0.5,0.45)", "--protect"))
+    region = sample_region(solid, parse_region("sphere(4.5,0.5,0.5,0.45)", "--protect"))
     shape = load_template("box-4x4x4")
     low = np.zeros(3)
     across, within = (
@@ -209,7 +215,7 @@ def test_kept_share_rises():
     solid = bar(4.0, 3.0, 2.0)
     voxels = cut(solid, "box-3x4x2")
     what, side = parse_keep("left:+z", "--keep")
-    keep = Keep("left:+z", area_of(solid, what), side)
+    keep = Keep("left:+z", sample_surface(solid, what), side)
     plain = replace(Wishes(keeps=(keep,)), keep_weight=0.0)
     strong = Wishes(keeps=(keep,), keep_weight=1.0)
     before = [strong.kept(voxels, search(voxels, "box-3x4x2", plain, s)[0])[0] for s in range(3)]
@@ -311,8 +317,8 @@ def test_painted_faces_are_a_region(tmp_path):
     store = StageStore(tmp_path)
     (tmp_path / "stages").mkdir()
     solid = read_solid(store, save_solid(store, solid))
-    assert len(region_of(solid, parse_shape("painted", "")).pieces) == 2
-    (eye,) = region_of(solid, parse_shape("painted(#ff0000)", "")).pieces
+    assert len(sample_region(solid, parse_region("painted", "")).pieces) == 2
+    (eye,) = sample_region(solid, parse_region("painted(#ff0000)", "")).pieces
     assert eye[:, 0].max() < -1.0
     voxels = cut(solid, "box-4x4x2")
     recipe = make_recipe(model="eyes.ply", template="box-4x4x2", protect=("painted",))
@@ -322,15 +328,15 @@ def test_painted_faces_are_a_region(tmp_path):
         assert (voxels.cells[list(group), 2] == 1).all()
     assert len(uncut.groups) == 2
     with pytest.raises(RecipeError, match="#0000ff"):
-        region_of(solid, parse_shape("painted(#00ff00)", ""))
+        sample_region(solid, parse_region("painted(#00ff00)", ""))
     with pytest.raises(RecipeError, match="no face of the model is painted"):
-        region_of(bar(), parse_shape("painted", ""))
+        sample_region(bar(), parse_region("painted", ""))
 
 
 def test_anchors_show_what_they_hold():
     voxels = cut(bar(), "box-4x4x2")
     shape = load_template("box-4x4x2")
-    keep = Keep("left:-y", area_of(bar(), face_named("left", "")), 3)
+    keep = Keep("left:-y", sample_surface(bar(), parse_side("left", "")), 3)
     for voxel, pose in Wishes(keeps=(keep,)).anchors(voxels, shape, [0]).tolist():
         cell, rotation = shape.cells[pose // 24], ROTATIONS[pose % 24]
         assert voxels.cells[voxel, 0] == 0

@@ -7,9 +7,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.srgb import linear_light
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["body_colours", "hex_colour", "palette"]
+__all__ = ["body_colours", "palette"]
 
 #: The first colours of every palette, chosen by eye.
 _FIRST = (
@@ -26,9 +27,7 @@ _FIRST = (
 
 def _oklab(rgb: NDArray[np.generic]) -> NDArray[np.float64]:
     """Oklab coordinates of (n, 3) sRGB bytes: equal distances look about equally different."""
-    unit = np.asarray(rgb, dtype=float) / 255.0
-    linear = np.where(unit <= 0.04045, unit / 12.92, ((unit + 0.055) / 1.055) ** 2.4)
-    cones = linear @ np.array(
+    cones = linear_light(rgb) @ np.array(
         [
             [0.4122214708, 0.2119034982, 0.0883024619],
             [0.5363325363, 0.6806995451, 0.2817188376],
@@ -117,6 +116,7 @@ def body_colours(tree: FoldTree) -> NDArray[np.uint8]:
     Parameters
     ----------
     tree : FoldTree
+        Says which bodies are neighbours, as the model (A) and as the box (B).
 
     Returns
     -------
@@ -147,9 +147,3 @@ def body_colours(tree: FoldTree) -> NDArray[np.uint8]:
         if not changed:
             break
     return np.asarray(colours[given], dtype=np.uint8)
-
-
-def hex_colour(colour: NDArray[np.generic]) -> str:
-    """``#RRGGBB`` of an sRGB triple of bytes."""
-    red, green, blue = (int(value) for value in colour)
-    return f"#{red:02X}{green:02X}{blue:02X}"

@@ -27,6 +27,7 @@ from fabfold.export.weld import printable_mesh
 from fabfold.files import write_bytes
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
+from fabfold.srgb import linear_light
 from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["SECONDS_PER_QUARTER", "glb_bytes", "keyframe_times", "write_glb"]
@@ -151,11 +152,7 @@ class _Buffer:
 
 def _linear(colour: NDArray[np.generic]) -> list[float]:
     """Linear light of sRGB bytes (3,), as the colour factors of glTF want it."""
-    unit = np.asarray(colour, dtype=float) / 255.0
-    return [
-        round(float(v), 6)
-        for v in np.where(unit <= 0.04045, unit / 12.92, ((unit + 0.055) / 1.055) ** 2.4)
-    ]
+    return [round(float(value), 6) for value in linear_light(colour)]
 
 
 def _eased_samples(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -18,6 +18,7 @@ from fabfold.errors import RecipeError
 from fabfold.export.camera import PinholeCamera, View, camera_for, project
 from fabfold.export.lighting import ShadowFloor, light_at, sun_frame
 from fabfold.export.shading import corner_normals
+from fabfold.srgb import bytes_of_light, linear_light
 
 __all__ = ["Image", "Mesh", "png_bytes", "render"]
 
@@ -25,19 +26,6 @@ __all__ = ["Image", "Mesh", "png_bytes", "render"]
 Image = NDArray[np.uint8]
 #: Vertices (v, 3) and triangles (f, 3) of a mesh.
 Mesh = tuple[NDArray[np.floating], NDArray[np.int32]]
-
-
-def _linear(colour: NDArray[np.generic] | Sequence[int]) -> NDArray[np.float64]:
-    """Linear light of sRGB bytes, 0 to 1."""
-    unit = np.asarray(colour, dtype=float) / 255.0
-    return np.asarray(np.where(unit <= 0.04045, unit / 12.92, ((unit + 0.055) / 1.055) ** 2.4))
-
-
-def _srgb(light: NDArray[np.floating]) -> Image:
-    """SRGB bytes of linear light; what is out of range is clipped."""
-    unit = np.clip(light, 0.0, 1.0)
-    curved = np.where(unit <= 0.0031308, unit * 12.92, 1.055 * unit ** (1 / 2.4) - 0.055)
-    return np.asarray(np.rint(curved * 255.0), dtype=np.uint8)
 
 
 def _lines(
@@ -121,18 +109,18 @@ def render(
         view,
     )
     image = np.empty((*triangle.shape, 3), dtype=np.float32)
-    image[:] = _linear(view.background)
+    image[:] = linear_light(view.background)
     on_model = int(covered.sum())
     shadow = floor.darkened(light[on_model:])
     image *= np.repeat(np.repeat(shadow, samples, axis=0), samples, axis=1)[..., None]
-    paint = _linear(colours)[owner]
+    paint = linear_light(colours)[owner]
     image[covered] = _painted(
         paint[triangle[covered]], light[:on_model], points[covered], facing[covered], camera, view
     )
     lines = _lines(triangle, near, facing * covered[..., None], owner)
     image *= (1.0 - view.edges * lines)[..., None]
     height, width = view.size[1], view.size[0]
-    return _srgb(image.reshape(height, samples, width, samples, 3).mean(axis=(1, 3)))
+    return bytes_of_light(image.reshape(height, samples, width, samples, 3).mean(axis=(1, 3)))
 
 
 def _gathered(

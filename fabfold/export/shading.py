@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.meshes import face_normals, vector_areas
+
 __all__ = ["corner_normals", "split_vertices"]
 
 #: Triangles that meet at less than this angle shade as one surface, degrees.
@@ -22,17 +24,20 @@ def corner_normals(
     Parameters
     ----------
     vertices : (v, 3) float array
+        Corner coordinates, in any unit.
     faces : (f, 3) int32 array
+        Three vertex indices for each triangle, counter-clockwise seen from outside.
     crease_deg : float
+        Triangles that meet at less than this angle shade as one surface, degrees.
 
     Returns
     -------
     (f, 3, 3) float64 array
+        For each triangle the outward normals at its three corners.
     """
     corners = np.asarray(vertices, dtype=np.float64)[faces]
-    weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(weighted, axis=1, keepdims=True)
-    unit = np.divide(weighted, length, out=np.zeros_like(weighted), where=length > 0)
+    weighted = vector_areas(corners)
+    unit, _ = face_normals(corners)
     # All ordered pairs of corners that share a vertex, made vertex by vertex.
     flat = faces.reshape(-1)
     order = np.argsort(flat, kind="stable")
@@ -63,16 +68,20 @@ def split_vertices(
     Parameters
     ----------
     vertices : (v, 3) float array
+        Corner coordinates, in any unit.
     faces : (f, 3) int32 array
+        Three vertex indices for each triangle, counter-clockwise seen from outside.
     crease_deg : float
+        Triangles that meet at less than this angle shade as one surface, degrees.
 
     Returns
     -------
     points : (w, 3) float32 array
+        Corner coordinates, repeated along creases.
     normals : (w, 3) float32 array
-        Unit vectors.
+        Outward unit vector at each point.
     faces : (f, 3) int32 array
-        Into `points`.
+        Three indices into `points` for each triangle.
     """
     normals = corner_normals(vertices, faces, crease_deg).reshape(-1, 3)
     # Normals that differ by less than a thousandth share a vertex.

@@ -28,7 +28,7 @@ from fabfold.export.surfaces import (
     sculpted_triangles,
 )
 from fabfold.export.thin import thinned
-from fabfold.export.weld import weld
+from fabfold.export.weld import weld_rounded
 from fabfold.files import write_text
 from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.meshes import mesh_volume
@@ -202,7 +202,7 @@ def _sound_brep(
 def _brep(body: BodyMesh, axes: list[Axis], level: str, thin_mm: float) -> Brep:
     vertices, faces = body.vertices, body.faces
     if level == "triangles":
-        points, faces = weld(vertices, faces)
+        points, faces = weld_rounded(vertices, faces)
         vertices = points.astype(np.float64)
         labels = np.arange(len(faces), dtype=np.int32)
         surfaces: list[Surface] = []

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fabfold.export.weld import printable_mesh
 from fabfold.files import write_bytes
 from fabfold.joinery.bodies import Joinery
+from fabfold.meshes import face_normals
 
 __all__ = ["stl_bytes", "write_stl"]
 
@@ -38,9 +39,7 @@ def stl_bytes(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> bytes:
     """
     corners = vertices[faces]
     wide = corners.astype(np.float64)
-    normals = np.cross(wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+    normals, _ = face_normals(wide)
     records = np.zeros(len(corners), dtype=_TRIANGLE)
     records["normal"] = normals.astype(np.float32) + np.float32(0.0)
     records["corners"] = corners

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.meshes import face_normals
+
 __all__ = [
     "FLAT_MM",
     "Axis",
@@ -133,11 +135,8 @@ def flat_regions(
         Plane of each region.
     """
     corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.linalg.norm(normals, axis=1)
-    normals = np.divide(
-        normals, doubled[:, None], out=np.zeros_like(normals), where=doubled[:, None] > 0
-    )
+    normals, areas = face_normals(corners)
+    doubled = 2 * areas
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     sliver = doubled < FLAT_MM * longest
     beside = _neighbours(faces).tolist()

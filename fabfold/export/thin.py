@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.export.weld import is_closed
-from fabfold.meshes import mesh_volume
+from fabfold.meshes import is_closed, mesh_volume
 
 __all__ = ["thinned"]
 

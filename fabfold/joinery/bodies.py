@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.meshes import triple_products
+
 __all__ = ["BodyMesh", "Joinery"]
 
 
@@ -33,9 +35,7 @@ class BodyMesh:
     def volume(self) -> float:
         """Enclosed volume in mm³."""
         corners = self.vertices[self.faces] - self.vertices.mean(axis=0)
-        return float(
-            np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
-        )
+        return float(triple_products(corners).sum() / 6)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
+from fabfold.meshes import compact, weld
 
 if TYPE_CHECKING:
     import manifold3d
@@ -50,17 +51,9 @@ def stl_mesh(
     faces : (g, 3) int32 array
         The triangles that are left, as indices into the new vertices.
     """
-    rounded = np.asarray(vertices, dtype=np.float32) + np.float32(0.0)  # -0.0 becomes 0.0
-    merged, index = np.unique(rounded, axis=0, return_inverse=True)
-    corners = index.reshape(-1)[np.asarray(faces, dtype=np.int64)]
-    kept = (
-        (corners[:, 0] != corners[:, 1])
-        & (corners[:, 1] != corners[:, 2])
-        & (corners[:, 2] != corners[:, 0])
-    )
-    corners = corners[kept]
-    used, compact = np.unique(corners, return_inverse=True)
-    return merged[used].astype(np.float64), compact.reshape(-1, 3).astype(np.int32)
+    rounded = np.asarray(vertices, dtype=np.float32)
+    points, triangles = compact(*weld(rounded, np.asarray(faces, dtype=np.int64), order="xyz"))
+    return points.astype(np.float64), triangles.astype(np.int32)
 
 
 def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.int64]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fabfold.joinery.bodies import Joinery
 from fabfold.kit.stages import Attempt
-from fabfold.voxels.region_cells import owners, to_lattice
+from fabfold.voxels.region_cells import containing_voxels, to_lattice
 from fabfold.voxels.voxel_model import Voxels
 from fabfold.wishes.terms import Wishes
 
@@ -22,9 +22,9 @@ def printed_share(points: NDArray[np.float64], voxels: Voxels, joinery: Joinery)
     Hinge barrels that pass by on the folding path need grooves, and bodies stand apart by a gap:
     both can take a little even of a protected region.
     """
-    from fabfold.solid.scan import occupancy
+    from fabfold.solid.scan import scan_mesh
 
-    holder = owners(voxels, points)
+    holder = containing_voxels(voxels, points)
     held = points[holder >= 0]
     if not len(held):
         return 0.0
@@ -41,7 +41,7 @@ def printed_share(points: NDArray[np.float64], voxels: Voxels, joinery: Joinery)
             body.vertices.max(axis=0) < at.min(axis=0)
         )
         if not apart.any():
-            grid = occupancy((body.vertices - low) / step, body.faces, (x, y, z))
+            grid = scan_mesh((body.vertices - low) / step, body.faces, (x, y, z))
             inside |= np.asarray(grid)[index]
     return float(inside.mean())
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.joinery.bodies import BodyMesh, Joinery
+from fabfold.meshes import face_normals
 from fabfold.printing.checks import Check
 from fabfold.printing.profiles import Profile
 from fabfold.printing.thickness import surface_area
@@ -60,9 +61,7 @@ def check_overhang(joinery: Joinery, profile: Profile) -> Check:
 def _overhang_areas(body: BodyMesh, steepest_deg: float) -> NDArray[np.float64]:
     """Area of the faces that hang over, by print direction +x, -x, +y, -y, +z, -z, mm²."""
     corners = body.vertices[body.faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    area = np.linalg.norm(across, axis=1)
-    unit = across / np.maximum(area, 1e-300)[:, None]
+    unit, area = face_normals(corners)
     hang = np.sin(np.radians(steepest_deg))
     found = []
     for axis in range(3):

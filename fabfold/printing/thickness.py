@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.joinery.bodies import BodyMesh
+from fabfold.meshes import face_areas, face_normals
 
 if TYPE_CHECKING:
     import manifold3d
@@ -36,9 +37,7 @@ class Thickness(NamedTuple):
 
 def surface_area(body: BodyMesh) -> float:
     """Area of a body's surface in mm²."""
-    corners = body.vertices[body.faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return float(np.linalg.norm(across, axis=1).sum() / 2)
+    return float(face_areas(body.vertices[body.faces]).sum())
 
 
 def surface_samples(
@@ -66,9 +65,8 @@ def surface_samples(
         Unit normals there, outwards.
     """
     corners = vertices[faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(across, axis=1)
-    reach = np.cumsum(length)
+    normals, areas = face_normals(corners)
+    reach = np.cumsum(areas)
     random = np.random.default_rng(0)
     targets = (np.arange(count) + random.random(count)) / count * reach[-1]
     chosen = np.minimum(np.searchsorted(reach, targets), len(faces) - 1)
@@ -77,8 +75,7 @@ def surface_samples(
     u, v = np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
     a, b, c = (corners[chosen, i] for i in range(3))
     points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
-    normals = across[chosen] / np.maximum(length[chosen], 1e-300)[:, None]
-    return points, normals
+    return points, normals[chosen]
 
 
 def ray_thickness(

@@ -123,14 +123,14 @@ class Recipe(BaseModel):
     @field_validator("keep", "protect")
     @classmethod
     def _readable_regions(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
-        from fabfold.solid.regions import parse_keep, parse_shape
+        from fabfold.solid.regions import parse_keep, parse_region
 
         texts = tuple(text for text in value if text != "none")
         for text in texts:
             if info.field_name == "keep":
                 parse_keep(text, "--keep")
             else:
-                parse_shape(text, "--protect")
+                parse_region(text, "--protect")
         return texts
 
     @field_validator("template")

@@ -7,7 +7,7 @@ from typing import Any
 from fabfold.errors import RecipeError
 from fabfold.recipe.recipe import Recipe
 from fabfold.solid.closed_solid import Solid
-from fabfold.solid.regions import area_of, parse_keep, parse_shape, region_of
+from fabfold.solid.regions import parse_keep, parse_region, sample_region, sample_surface
 from fabfold.tree.problem import Weights
 from fabfold.wishes.terms import Keep, Wishes
 
@@ -39,7 +39,7 @@ def make_wishes(recipe: Recipe, solid: Solid) -> Wishes:
     keeps = []
     for text in recipe.keep:
         what, side = parse_keep(text, "--keep")
-        keeps.append(Keep(text, area_of(solid, what), side))
+        keeps.append(Keep(text, sample_surface(solid, what), side))
     seen: dict[str, str] = {}
     for text in recipe.keep:
         part, _, there = text.strip().rpartition(":")
@@ -48,7 +48,8 @@ def make_wishes(recipe: Recipe, solid: Solid) -> Wishes:
                 f"--keep: {part} cannot be seen on {seen[part]} and on {there} of the box at once"
             )
     regions = [
-        region_of(solid, parse_shape(text, "--protect"), "--protect") for text in recipe.protect
+        sample_region(solid, parse_region(text, "--protect"), "--protect")
+        for text in recipe.protect
     ]
     return Wishes(
         keeps=tuple(keeps),

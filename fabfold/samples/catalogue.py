@@ -1,4 +1,7 @@
-"""Built-in samples: models of our own, drawn with build123d, to fold without a file at hand."""
+"""The built-in samples by name, and models from a sample or a file.
+
+A sample is a model drawn with build123d, to fold without a file at hand.
+"""
 
 from __future__ import annotations
 
@@ -67,12 +70,28 @@ _SAMPLES = {
 
 
 def sample_names() -> list[str]:
-    """Names of the samples, sorted."""
+    """Names of the samples.
+
+    Returns
+    -------
+    list of str
+        Sorted.
+    """
     return sorted(_SAMPLES)
 
 
 def sample(name: str) -> Sample:
-    """What is known of a sample before it is built.
+    """What is known of a sample before it is drawn.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`sample_names`.
+
+    Returns
+    -------
+    Sample
+        Its title, template and version.
 
     Raises
     ------
@@ -102,6 +121,8 @@ def build_sample(name: str) -> build123d.Part:
     ------
     ModelError
         If there is no such sample.
+    GeometryError
+        If the CAD kernel does not draw it as one valid solid.
     """
     known = sample(name)
     draw: Callable[[], Any] = import_module(f"fabfold.samples.{known.name}").draw
@@ -113,7 +134,17 @@ def build_sample(name: str) -> build123d.Part:
 
 
 def load_sample(name: str) -> Solid:
-    """A sample as a closed manifold, the same bytes every time.
+    """A sample as a closed solid, the same bytes every time.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`sample_names`.
+
+    Returns
+    -------
+    Solid
+        In mm.
 
     Raises
     ------
@@ -124,12 +155,17 @@ def load_sample(name: str) -> Solid:
 
 
 def load_model(source: str | Path) -> Solid:
-    """A model file or a built-in sample as a closed manifold.
+    """A model file or a built-in sample as a closed solid.
 
     Parameters
     ----------
     source : str or Path
         Path of a model file, or ``"sample:NAME"``.
+
+    Returns
+    -------
+    Solid
+        In the units of the file; samples are in mm.
 
     Raises
     ------
@@ -152,10 +188,12 @@ def solid_of(part: build123d.Part, known: Sample) -> Solid:
     part : build123d.Part
         What :func:`build_sample` returns.
     known : Sample
+        Gives the solid its name and its digest.
 
     Returns
     -------
     Solid
+        In mm.
     """
     from fabfold.solid.load import solid_from_mesh
     from fabfold.solid.raw import RawMesh

@@ -1,4 +1,4 @@
-"""Round building blocks of the samples: ellipsoids, limbs, rounded slabs."""
+"""Round shapes that the samples are made of: ellipsoids, limbs, cylinders with rounded rims."""
 
 from __future__ import annotations
 
@@ -11,10 +11,22 @@ Triple = tuple[float, float, float]
 
 
 def ellipsoid(centre: Triple, radii: Triple, turn: Triple = (0, 0, 0)) -> Any:
-    """Ellipsoid with three radii, turned by Euler angles (degrees, intrinsic XYZ).
+    """Ellipsoid, turned about its centre.
 
-    With two equal radii it is a surface of revolution, with three a sphere: the kernel unites
-    these several times faster than general ellipsoids.
+    Parameters
+    ----------
+    centre : (float, float, float)
+        In mm.
+    radii : (float, float, float)
+        Along x, y and z before the turn, mm.
+    turn : (float, float, float)
+        Euler angles, intrinsic XYZ, degrees.
+
+    Returns
+    -------
+    build123d.Part
+        With two equal radii a surface of revolution, with three a sphere: the kernel unites these
+        several times faster than general ellipsoids.
     """
     from build123d import (
         Axis,
@@ -48,9 +60,14 @@ def limb(points: Sequence[Triple], radii: Sequence[float]) -> Any:
     Parameters
     ----------
     points : sequence of (x, y, z)
-        Where the middle line passes; two make a straight limb.
+        Where the middle line passes, mm; two make a straight limb.
     radii : sequence of float
-        Radius at each point.
+        Radius at each point, mm.
+
+    Returns
+    -------
+    build123d.Part
+        One solid.
     """
     from build123d import Circle, Plane, Pos, Solid, Sphere, Spline, Vector, loft
 
@@ -79,14 +96,36 @@ def _across(tangent: Any) -> Any:
 
 
 def both_sides(shape: Any) -> list[Any]:
-    """A shape and its mirror image in the plane y = 0."""
+    """A shape and its mirror image in the plane y = 0.
+
+    Parameters
+    ----------
+    shape : build123d.Part
+        On either side of the plane.
+
+    Returns
+    -------
+    list of build123d.Part
+        The shape itself and its mirror image.
+    """
     from build123d import Plane, mirror
 
     return [shape, mirror(shape, about=Plane.XZ)]
 
 
 def fuse(parts: Sequence[Any]) -> Any:
-    """Union of all parts as one Part."""
+    """Unite parts.
+
+    Parameters
+    ----------
+    parts : sequence of build123d.Part
+        At least one.
+
+    Returns
+    -------
+    build123d.Part
+        The solids of the union.
+    """
     from build123d import Compound, Part
 
     whole = parts[0].fuse(*parts[1:]) if len(parts) > 1 else parts[0]
@@ -94,7 +133,24 @@ def fuse(parts: Sequence[Any]) -> Any:
 
 
 def cylinder_y(centre: Triple, radius: float, width: float, round_by: float = 0.0) -> Any:
-    """Cylinder along y, its rims rounded by `round_by` if that is not 0."""
+    """Cylinder along y, with rounded rims.
+
+    Parameters
+    ----------
+    centre : (float, float, float)
+        In mm.
+    radius : float
+        In mm.
+    width : float
+        Length along y, mm.
+    round_by : float
+        Radius of the rims, mm; 0 leaves them sharp.
+
+    Returns
+    -------
+    build123d.Part
+        One solid.
+    """
     from build123d import Cylinder, Location, fillet
 
     body = Cylinder(radius, width)

@@ -1,16 +1,13 @@
-"""The closed manifold that every later stage works on."""
+"""The closed solid that every later stage works on, and its painted faces."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import manifold3d
-    import trimesh
+from fabfold.meshes import triple_products
 
 __all__ = ["Paint", "Solid"]
 
@@ -22,7 +19,7 @@ class Paint:
     Attributes
     ----------
     corners : (k, 3, 3) float64 array
-        Of each triangle, model units.
+        Coordinates of the three corners of each triangle, in model units.
     colours : (k, 3) uint8 array
         sRGB of each triangle.
     """
@@ -42,7 +39,7 @@ class Solid:
     vertices : (v, 3) float64 array
         Corner coordinates in model units.
     faces : (f, 3) int32 array
-        Corner indices, counter-clockwise seen from outside.
+        Three vertex indices for each triangle, counter-clockwise seen from outside.
     notes : tuple of str
         What was repaired or assumed on the way, in a maker's words.
     sha256 : str
@@ -62,28 +59,9 @@ class Solid:
     def volume(self) -> float:
         """Enclosed volume in cubic model units."""
         corners = self.vertices[self.faces] - self.vertices.mean(axis=0)
-        return float(
-            np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
-        )
+        return float(triple_products(corners).sum() / 6)
 
     @property
     def bounds(self) -> NDArray[np.float64]:
         """Smallest and largest corner of the bounding box, shape (2, 3), model units."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
-
-    def to_manifold(self) -> manifold3d.Manifold:
-        """The same solid as a manifold3d object (double precision)."""
-        import manifold3d
-
-        return manifold3d.Manifold(
-            manifold3d.Mesh64(
-                np.ascontiguousarray(self.vertices, dtype=np.float64),
-                np.ascontiguousarray(self.faces, dtype=np.uint64),
-            )
-        )
-
-    def to_trimesh(self) -> trimesh.Trimesh:
-        """The same solid as a trimesh object, vertices untouched."""
-        import trimesh
-
-        return trimesh.Trimesh(self.vertices, self.faces, process=False)

@@ -1,7 +1,7 @@
 """Read a model of any supported format and make one closed solid of it.
 
-The stages: read (with the checks that make errors speak plainly), bring to unit size, close the
-surface, unite the shells, keep one piece, thin dense meshes, and go back to the model's own units.
+The steps: read and check the file, scale the mesh to unit size, close its surface, unite the
+shells, keep one piece, decimate a dense mesh, and go back to the model's own units.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from fabfold.errors import ModelError
 from fabfold.files import sha256_of
 from fabfold.solid.closed_solid import Solid
-from fabfold.solid.convert import thinned, to_mesh
+from fabfold.solid.convert import decimated, to_mesh
 from fabfold.solid.paint import painted_faces
-from fabfold.solid.pieces import one_piece
+from fabfold.solid.pieces import largest_piece
 from fabfold.solid.raw import RawMesh
 from fabfold.solid.surface import OpenSurfaceError, close_surface
 from fabfold.solid.topology import Points
@@ -39,7 +39,7 @@ def load_solid(path: str | Path) -> Solid:
     Parameters
     ----------
     path : str or Path
-        A file in one of :data:`FORMATS`.
+        A file with one of the suffixes :data:`FORMATS`.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def load_solid(path: str | Path) -> Solid:
     each turned outwards, is at least 1); closed cavities are filled; loose pieces are dropped if
     together they are at most 5 % of the volume, and refused otherwise (small ones that hang free
     by a hair are moved to touch); holes are capped where the caps are small beside the surface;
-    meshes above 200,000 triangles are thinned; a model thinner than 1 % of its longest side is
+    meshes above 200,000 triangles are decimated; a model thinner than 1 % of its longest side is
     refused.
     """
     path = Path(path)
@@ -110,10 +110,16 @@ def solid_from_mesh(name: str, raw: RawMesh, sha256: str = "", label: str = "") 
     name : str
         Name of the solid.
     raw : RawMesh
+        Triangles as a reader gives them, nothing repaired yet.
     sha256 : str, optional
-        Digest of the file.
+        Digest of the file; that of the triangles if not given.
     label : str, optional
         What messages call the model; `name` if not given.
+
+    Returns
+    -------
+    Solid
+        In the units and place of the triangles; `notes` says what was repaired.
 
     Raises
     ------
@@ -131,8 +137,8 @@ def solid_from_mesh(name: str, raw: RawMesh, sha256: str = "", label: str = "") 
 
         shells, done = wrap_surface(label, vertices, raw.faces, str(error.args[0]))
     notes += done
-    body = one_piece(label, unite(label, shells, notes), notes)
-    body = thinned(body, MAX_TRIANGLES)
+    body = largest_piece(label, unite(label, shells, notes), notes)
+    body = decimated(body, MAX_TRIANGLES)
     if len(raw.faces) > MAX_TRIANGLES:
         notes.append(f"{len(raw.faces):,} triangles were thinned to {body.num_tri():,}")
     points, faces = to_mesh(body)

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.meshes import face_areas
 from fabfold.solid.closed_solid import Paint
 
-__all__ = ["colours_of_corners", "colours_of_mesh", "painted_faces"]
+__all__ = ["SAME_COLOUR", "colours_of_corners", "colours_of_mesh", "painted_faces"]
 
 #: Colours whose bytes differ by no more than this are one.
-_ALIKE = 8
+SAME_COLOUR = 8
 
 
 def colours_of_corners(
@@ -23,12 +24,14 @@ def colours_of_corners(
     Parameters
     ----------
     faces : (f, 3) integer array
+        Three vertex indices for each triangle.
     colours : (v, 3) integer array
         sRGB of each vertex.
 
     Returns
     -------
     (f, 3) uint8 array
+        sRGB of each triangle.
     """
     a, b, c = (np.asarray(colours)[faces[:, k]].astype(int) for k in range(3))
     mean = np.rint((a + b + c) / 3).astype(int)
@@ -38,7 +41,18 @@ def colours_of_corners(
 
 
 def colours_of_mesh(mesh: Any) -> NDArray[np.uint8] | None:
-    """Face colours of a trimesh object, from face or vertex colours or its material; else None."""
+    """Face colours of a trimesh object: its face or vertex colours, or those of its material.
+
+    Parameters
+    ----------
+    mesh : trimesh.Trimesh
+        As it was loaded, its faces in the order of the file.
+
+    Returns
+    -------
+    (f, 3) uint8 array or None
+        sRGB of each triangle; None if the mesh has no colours.
+    """
     visual = mesh.visual
     if visual.kind == "texture":
         try:
@@ -62,18 +76,24 @@ def painted_faces(
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corner coordinates in model units.
     faces : (f, 3) integer array
+        Three vertex indices for each triangle.
     colours : (f, 3) uint8 array or None
+        sRGB of each triangle; None where the file has no colours.
+
+    Returns
+    -------
+    Paint or None
+        None if all faces have about the same colour.
     """
     if colours is None or len(colours) != len(faces):
         return None
     corners = np.asarray(vertices, dtype=np.float64)[faces]
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    area = face_areas(corners)
     known, which = np.unique(colours, axis=0, return_inverse=True)
     base = known[int(np.bincount(which.reshape(-1), weights=area).argmax())].astype(int)
-    other = np.abs(colours.astype(int) - base).max(axis=1) > _ALIKE
+    other = np.abs(colours.astype(int) - base).max(axis=1) > SAME_COLOUR
     other &= area > 0
     if not other.any():
         return None

@@ -1,4 +1,4 @@
-"""What to do with pieces that hang free: join them over a hair, drop them, or refuse."""
+"""What to do with loose pieces: move them to touch the body, drop them, or refuse the model."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from fabfold.solid.words import were
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["HAIR", "LOOSE_SHARE", "one_piece"]
+__all__ = ["LOOSE_SHARE", "TOUCH_GAP", "largest_piece"]
 
 #: A loose piece counts as small up to this share of the volume. Small pieces that cannot be
 #: joined are dropped if together they have at most this share, too.
 LOOSE_SHARE = 0.05
 #: Small pieces nearer than this (longest side about 1) are moved to touch the body.
-HAIR = 0.005
+TOUCH_GAP = 0.005
 #: Pieces nearer than this touch, in a point or along an edge.
 TOUCHING = 1e-9
 
 
-def one_piece(name: str, united: manifold3d.Manifold, notes: list[str]) -> manifold3d.Manifold:
-    """The largest piece, with small ones joined to it or dropped.
+def largest_piece(name: str, united: manifold3d.Manifold, notes: list[str]) -> manifold3d.Manifold:
+    """The largest piece of a solid, with small pieces joined to it or dropped.
 
     Parameters
     ----------
@@ -35,7 +35,12 @@ def one_piece(name: str, united: manifold3d.Manifold, notes: list[str]) -> manif
     united : manifold3d.Manifold
         Longest side about 1, without cavities.
     notes : list of str
-        What was done is appended.
+        Sentences for the maker; what was done is appended.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        One piece, in the same place.
 
     Raises
     ------
@@ -53,7 +58,7 @@ def one_piece(name: str, united: manifold3d.Manifold, notes: list[str]) -> manif
     body, loose = _join(parts)
     if joined := len(parts) - 1 - len(loose):
         notes.append(
-            f"{were(joined, 'piece')} free of the body by a hair (less than {HAIR:.1%} of the "
+            f"{were(joined, 'piece')} free of the body by a hair (less than {TOUCH_GAP:.1%} of the "
             "model's length) and moved to touch it"
         )
     if loose:
@@ -65,11 +70,11 @@ def one_piece(name: str, united: manifold3d.Manifold, notes: list[str]) -> manif
 
 
 def _join(parts: list[manifold3d.Manifold]) -> tuple[manifold3d.Manifold, list[int]]:
-    """The first part with all that is within a hair of it; the indices of the others."""
+    """The first part with all that come as near to it as TOUCH_GAP; the indices of the others."""
     body, loose = parts[0], list(range(1, len(parts)))
     while True:
         for index in loose:
-            if body.min_gap(parts[index], HAIR) < HAIR:
+            if body.min_gap(parts[index], TOUCH_GAP) < TOUCH_GAP:
                 merged = body + _moved(parts[index], body)
                 if len(merged.decompose()) == 1:
                     body = merged
@@ -80,15 +85,15 @@ def _join(parts: list[manifold3d.Manifold]) -> tuple[manifold3d.Manifold, list[i
 
 
 def _moved(part: manifold3d.Manifold, body: manifold3d.Manifold) -> manifold3d.Manifold:
-    """A small part moved towards the body until it stands half a hair deep in it."""
+    """A small part moved towards the body until it reaches half of TOUCH_GAP into it."""
     gap = _nearest(part, body)
     length = float(np.linalg.norm(gap))
     if length < TOUCHING:
         low, high = np.array(body.bounding_box()).reshape(2, 3)
         own_low, own_high = np.array(part.bounding_box()).reshape(2, 3)
         gap = (low + high) - (own_low + own_high)
-        return part.translate((gap * (HAIR / np.linalg.norm(gap))).tolist())
-    return part.translate((gap * (1 + HAIR / 2 / length)).tolist())
+        return part.translate((gap * (TOUCH_GAP / np.linalg.norm(gap))).tolist())
+    return part.translate((gap * (1 + TOUCH_GAP / 2 / length)).tolist())
 
 
 def _nearest(part: manifold3d.Manifold, body: manifold3d.Manifold) -> NDArray[np.float64]:
@@ -109,7 +114,7 @@ def _too_many(
     told = [f"{share:.0%}" for share in shares if share >= 0.005][:6]
     if len(parts) > len(told):
         told.append(f"{len(parts) - len(told)} smaller")
-    touch = parts[0].min_gap(parts[1], HAIR) < TOUCHING
+    touch = parts[0].min_gap(parts[1], TOUCH_GAP) < TOUCHING
     how = "touch in an edge or a corner only, which has no strength" if touch else "stand apart"
     return ModelError(
         f"{name} is not one piece: it falls into {len(parts)} pieces that {how} "

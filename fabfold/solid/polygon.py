@@ -1,4 +1,4 @@
-"""Polygons of faces and hole rims, cut into triangles."""
+"""Cut polygons into triangles: faces of more than three corners, and the caps of holes."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ def triangulate_polygons(
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corner coordinates, in any unit.
     polygons : sequence of sequences of int
         Three or more vertex indices each, counter-clockwise seen from outside.
 
@@ -42,7 +43,7 @@ def triangulate_loop(points: NDArray[np.float64]) -> NDArray[np.int64]:
     Parameters
     ----------
     points : (n, 3) float64 array
-        The loop in order; it need not be flat or convex.
+        Corners of the loop in order, in any unit; it need not be flat or convex.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a reader hands on: triangles as the file gives them, nothing repaired yet."""
+"""What all readers share: the triangles that they hand on, and looks at the first bytes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import ModelError
 
-__all__ = ["RawMesh", "no_faces", "what_is_it"]
+__all__ = ["RawMesh", "head_of", "is_text", "no_faces", "what_is_it"]
 
 #: How the bytes of files begin that people rename by mistake.
 _SIGNATURES: tuple[tuple[bytes, str], ...] = (
@@ -32,7 +32,7 @@ _SIGNATURES: tuple[tuple[bytes, str], ...] = (
 
 @dataclass(frozen=True)
 class RawMesh:
-    """Triangles as read.
+    """Triangles as a reader gives them, nothing repaired yet.
 
     Attributes
     ----------
@@ -56,7 +56,20 @@ class RawMesh:
 
 
 def no_faces(name: str, found: str = "") -> ModelError:
-    """The error for a readable file that holds no triangle."""
+    """The error for a readable file that holds no triangle.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file.
+    found : str
+        What the file has instead, in brackets after a blank.
+
+    Returns
+    -------
+    ModelError
+        To be raised by the reader.
+    """
     return ModelError(
         f"{name} has no triangles{found}: there is no surface to fold; "
         "export the model as a closed mesh"
@@ -64,7 +77,18 @@ def no_faces(name: str, found: str = "") -> ModelError:
 
 
 def what_is_it(head: bytes) -> str:
-    """Name the content of a file by its first bytes, for messages about renamed files."""
+    """Name the content of a file by its first bytes, for messages about renamed files.
+
+    Parameters
+    ----------
+    head : bytes
+        The first bytes of the file, see :func:`head_of`.
+
+    Returns
+    -------
+    str
+        With its article, such as ``"a PNG picture"``.
+    """
     for signature, meaning in _SIGNATURES:
         if head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(signature):
             return meaning
@@ -72,12 +96,36 @@ def what_is_it(head: bytes) -> str:
 
 
 def is_text(head: bytes) -> bool:
-    """Whether the first bytes of a file look like text (no control characters)."""
+    """Whether the first bytes of a file look like text.
+
+    Parameters
+    ----------
+    head : bytes
+        The first bytes of the file, see :func:`head_of`.
+
+    Returns
+    -------
+    bool
+        True where there are no control characters other than white space.
+    """
     allowed = {9, 10, 11, 12, 13}
     return all(byte >= 32 or byte in allowed for byte in head)
 
 
 def head_of(path: Path, size: int = 1024) -> bytes:
-    """The first bytes of a file."""
+    """The first bytes of a file.
+
+    Parameters
+    ----------
+    path : Path
+        Any file.
+    size : int
+        How many bytes; a shorter file gives fewer.
+
+    Returns
+    -------
+    bytes
+        From the beginning of the file.
+    """
     with path.open("rb") as stream:
         return stream.read(size)

@@ -24,6 +24,16 @@ _PLY_BYTES = {
 def read_ply(path: Path) -> RawMesh:
     """Read a PLY file, ASCII or binary.
 
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        With the colours of faces or vertices, where the file has them.
+
     Raises
     ------
     ModelError
@@ -92,6 +102,16 @@ def _check_ply(path: Path) -> tuple[dict[str, int], bool]:
 def read_glb(path: Path) -> RawMesh:
     """Read every mesh of a binary glTF scene, placed by its node, turned from y up to z up.
 
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        All meshes in one, with their colours; z points up.
+
     Raises
     ------
     ModelError
@@ -137,6 +157,16 @@ def _load_with_trimesh(path: Path, kind: str) -> Any:
 
 def read_3mf(path: Path) -> RawMesh:
     """Read the build items of a 3MF file, each mesh placed by its transforms.
+
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        All meshes in one; with colours if each mesh has them.
 
     Raises
     ------

@@ -25,6 +25,16 @@ __all__ = ["read_step"]
 def read_step(path: Path) -> RawMesh:
     """Read all solids of a STEP file and cut their surfaces into triangles.
 
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        The triangles of all solids; those of all faces if there is no solid.
+
     Raises
     ------
     ModelError

@@ -22,6 +22,16 @@ def read_obj(path: Path) -> RawMesh:
 
     Colours are read where every vertex line has them, ``v x y z red green blue`` from 0 to 1.
 
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        Polygons are cut into triangles; the vertices are those of the file.
+
     Raises
     ------
     ModelError
@@ -92,6 +102,16 @@ def _check_range(path: Path, polygons: Sequence[Sequence[int]], count: int) -> N
 
 def read_off(path: Path) -> RawMesh:
     """Read an ASCII OFF file (also COFF, NOFF and so on: only the positions are used).
+
+    Parameters
+    ----------
+    path : Path
+        A file that is not empty.
+
+    Returns
+    -------
+    RawMesh
+        Polygons are cut into triangles; the vertices are those of the file.
 
     Raises
     ------

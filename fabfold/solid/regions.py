@@ -1,4 +1,4 @@
-"""Parts of a model that somebody points at: boxes, spheres, painted faces, and sides.
+"""Regions and sides of a model by name: boxes, spheres, painted faces, front, top and so on.
 
 A region is written ``box(x0,y0,z0,x1,y1,z1)``, ``sphere(x,y,z,r)``, ``painted`` or
 ``painted(#rrggbb)``. Numbers are in the model's own units and axes; a number with ``%`` is a share
@@ -11,29 +11,29 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import RecipeError
 from fabfold.lattice.rotations import FACES
+from fabfold.meshes import face_areas, face_normals
 from fabfold.solid.closed_solid import Solid
-
-if TYPE_CHECKING:
-    pass
+from fabfold.solid.paint import SAME_COLOUR
+from fabfold.srgb import colour_of_hex, hex_of_colour
 
 __all__ = [
-    "Area",
     "Region",
-    "Shape",
-    "area_of",
-    "face_named",
+    "RegionText",
+    "SurfaceSamples",
     "parse_keep",
-    "parse_shape",
-    "region_of",
+    "parse_region",
+    "parse_side",
+    "sample_region",
+    "sample_surface",
 ]
 
+#: Coordinates, shape (k, 3).
 Points = NDArray[np.float64]
 
 #: Sides by name, as indices of :data:`fabfold.lattice.rotations.FACES`.
@@ -44,8 +44,8 @@ _SIDES = {
 #: Samples along the longest side of a region, and of a model seen from one side.
 _REGION_STEPS = 40
 _VIEW_STEPS = 160
-#: Pieces of a region with less than this share of its material are no pieces of their own.
-CRUMB = 0.01
+#: Pieces of a region with less than this share of its material are left out.
+MIN_PIECE_SHARE = 0.01
 #: Most of the samples of painted faces along the model's longest side.
 _PAINT_STEPS = 400
 
@@ -54,8 +54,8 @@ _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(%?)")
 
 
 @dataclass(frozen=True)
-class Shape:
-    """A region as it is written.
+class RegionText:
+    """A region as it is written; its numbers may be shares of a model not yet known.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Shape:
     kind : str
         ``"box"``, ``"sphere"`` or ``"painted"``.
     numbers : tuple of (float, bool)
-        Each number, and whether it is a percentage.
+        Each number, in model units or per cent, and whether it is per cent.
     colour : (int, int, int) or None
         sRGB of painted faces; None for any colour.
     """
@@ -74,8 +74,19 @@ class Shape:
     numbers: tuple[tuple[float, bool], ...] = ()
     colour: tuple[int, int, int] | None = None
 
-    def placed(self, bounds: Points) -> NDArray[np.float64]:
-        """The numbers in model units, given the model's bounds (2, 3)."""
+    def in_model_units(self, bounds: Points) -> NDArray[np.float64]:
+        """The numbers of a box or a sphere, percentages worked out.
+
+        Parameters
+        ----------
+        bounds : (2, 3) float64 array
+            Smallest and largest corner of the model's bounding box, model units.
+
+        Returns
+        -------
+        (6,) or (4,) float64 array
+            In model units, in the order in which they are written.
+        """
         extent = bounds[1] - bounds[0]
         out = []
         for place, (number, share) in enumerate(self.numbers):
@@ -88,26 +99,62 @@ class Shape:
                 out.append(float(bounds[0, axis] + number / 100 * extent[axis]))
         return np.array(out)
 
-    def holds(self, points: Points, bounds: Points) -> NDArray[np.bool_]:
-        """Which of the points (k, 3) lie in a box or a sphere."""
-        numbers = self.placed(bounds)
+    def contains(self, points: Points, bounds: Points) -> NDArray[np.bool_]:
+        """Which points lie in a box or a sphere.
+
+        Parameters
+        ----------
+        points : (k, 3) float64 array
+            Model units.
+        bounds : (2, 3) float64 array
+            Smallest and largest corner of the model's bounding box, model units.
+
+        Returns
+        -------
+        (k,) bool array
+            True on the border, too.
+        """
+        numbers = self.in_model_units(bounds)
         if self.kind == "sphere":
             return np.asarray(np.linalg.norm(points - numbers[:3], axis=1) <= numbers[3])
         corners = numbers.reshape(2, 3)
         low, high = corners.min(axis=0), corners.max(axis=0)
         return np.asarray(((points >= low) & (points <= high)).all(axis=1))
 
-    def hull(self, bounds: Points) -> Points:
-        """Box around a box or a sphere, (2, 3)."""
-        numbers = self.placed(bounds)
+    def bounding_box(self, bounds: Points) -> Points:
+        """Bounding box of a box or a sphere.
+
+        Parameters
+        ----------
+        bounds : (2, 3) float64 array
+            Smallest and largest corner of the model's bounding box, model units.
+
+        Returns
+        -------
+        (2, 3) float64 array
+            Smallest and largest corner, model units.
+        """
+        numbers = self.in_model_units(bounds)
         if self.kind == "sphere":
             return np.array([numbers[:3] - numbers[3], numbers[:3] + numbers[3]])
         corners = numbers.reshape(2, 3)
         return np.array([corners.min(axis=0), corners.max(axis=0)])
 
 
-def face_named(text: str, option: str) -> int:
-    """Index in :data:`fabfold.lattice.rotations.FACES` of a side or an axis by its name.
+def parse_side(text: str, option: str) -> int:
+    """Read the name of a side of a model or a box, or of an axis.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``"front"`` or ``"-y"``.
+    option : str
+        What the error message calls the option that the text was given to.
+
+    Returns
+    -------
+    int
+        Index in :data:`fabfold.lattice.rotations.FACES`.
 
     Raises
     ------
@@ -122,8 +169,23 @@ def face_named(text: str, option: str) -> int:
     return _SIDES[name]
 
 
-def parse_keep(text: str, option: str) -> tuple[Shape | int, int]:
+def parse_keep(text: str, option: str) -> tuple[RegionText | int, int]:
     """Read ``WHAT:SIDE``: a side or region of the model, and a side of the box.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``"front:+x"``.
+    option : str
+        What the error message calls the option that the text was given to.
+
+    Returns
+    -------
+    what : RegionText or int
+        A region of the model, or a side as an index of
+        :data:`fabfold.lattice.rotations.FACES`.
+    side : int
+        The side of the box, as such an index.
 
     Raises
     ------
@@ -135,19 +197,31 @@ def parse_keep(text: str, option: str) -> tuple[Shape | int, int]:
         raise RecipeError(
             f"{option}: wants what to keep and where, such as front:+x, found {text!r}"
         )
-    target = face_named(side, option)
+    target = parse_side(side, option)
     if what.strip().lower() in _SIDES:
-        return face_named(what, option), target
+        return parse_side(what, option), target
     if "(" not in what and what.strip().lower() != "painted":
         raise RecipeError(
             f"{option}: {what.strip()!r} is neither a side of the model "
             f"({', '.join(_SIDES)}) nor a region such as box(x0,y0,z0,x1,y1,z1)"
         )
-    return parse_shape(what, option), target
+    return parse_region(what, option), target
 
 
-def parse_shape(text: str, option: str) -> Shape:
+def parse_region(text: str, option: str) -> RegionText:
     """Read a region.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``"sphere(10,0,50%,4)"``.
+    option : str
+        What the error message calls the option that the text was given to.
+
+    Returns
+    -------
+    RegionText
+        To be sampled by :func:`sample_region` or :func:`sample_surface`.
 
     Raises
     ------
@@ -162,7 +236,7 @@ def parse_shape(text: str, option: str) -> Shape:
         )
     kind, inner = match.group(1), match.group(2)
     if kind == "painted":
-        return Shape(text, kind, colour=None if inner is None else _colour(inner, option))
+        return RegionText(text, kind, colour=None if inner is None else _colour(inner, option))
     wanted = {"box": 6, "sphere": 4}[kind]
     parts = [] if inner is None else [part.strip() for part in inner.split(",")]
     numbers = [_NUMBER.fullmatch(part) for part in parts]
@@ -174,28 +248,27 @@ def parse_shape(text: str, option: str) -> Shape:
     read = tuple((float(n.group(1)), n.group(2) == "%") for n in numbers if n is not None)
     if kind == "sphere" and read[3][0] <= 0:
         raise RecipeError(f"{option}: the radius of {text!r} must be greater than 0")
-    return Shape(text, kind, read)
+    return RegionText(text, kind, read)
 
 
 def _colour(text: str, option: str) -> tuple[int, int, int]:
-    match = re.fullmatch(r"#?([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})", text.strip())
-    if match is None:
+    colour = colour_of_hex(text)
+    if colour is None:
         raise RecipeError(f"{option}: a colour is written #rrggbb, found {text!r}")
-    red, green, blue = (int(part, 16) for part in match.groups())
-    return (red, green, blue)
+    return colour
 
 
 @dataclass(frozen=True)
 class Region:
-    """A region of a model, sampled.
+    """A region of a model as sample points.
 
     Attributes
     ----------
     text : str
         As it was written.
     pieces : tuple of (k, 3) float64 arrays
-        Sample points, model units: of the material in a box or a sphere, or of painted faces;
-        one array for each piece that hangs together within the region.
+        Sample points, model units: of the material in a box or a sphere, or just under painted
+        faces; one array for each connected piece of the region, the largest first.
     """
 
     text: str
@@ -203,8 +276,8 @@ class Region:
 
 
 @dataclass(frozen=True)
-class Area:
-    """A part of the model's surface, sampled.
+class SurfaceSamples:
+    """A part of a model's surface as sample points.
 
     Attributes
     ----------
@@ -221,17 +294,17 @@ class Area:
     weight: NDArray[np.float64]
 
 
-def _material(
-    solid: Solid, low: Points, step: float, shape: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    from fabfold.solid.scan import occupancy
+def _material(solid: Solid, low: Points, step: float, size: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which cubes of side `step` from the corner `low` on have their centre in the model."""
+    # Imported here: numba takes a second, and whoever only reads a recipe needs none of it.
+    from fabfold.solid.scan import scan_mesh
 
-    x, y, z = shape.tolist()
+    x, y, z = size.tolist()
     vertices = (np.asarray(solid.vertices, dtype=np.float64) - low) / step
-    return np.asarray(occupancy(vertices, np.asarray(solid.faces, dtype=np.int32), (x, y, z)))
+    return scan_mesh(vertices, np.asarray(solid.faces, dtype=np.int32), (x, y, z))
 
 
-def _nothing_there(shape: Shape, bounds: Points, option: str) -> RecipeError:
+def _nothing_there(shape: RegionText, bounds: Points, option: str) -> RecipeError:
     low, high = (", ".join(f"{value:.4g}" for value in corner) for corner in bounds)
     return RecipeError(
         f"{option} {shape.text}: there is no material of the model in it; the model reaches from "
@@ -239,8 +312,22 @@ def _nothing_there(shape: Shape, bounds: Points, option: str) -> RecipeError:
     )
 
 
-def region_of(solid: Solid, shape: Shape, option: str = "--protect") -> Region:
+def sample_region(solid: Solid, shape: RegionText, option: str = "--protect") -> Region:
     """Sample a region of a model.
+
+    Parameters
+    ----------
+    solid : Solid
+        The model.
+    shape : RegionText
+        The region.
+    option : str
+        What the error message calls the option that the region was given to.
+
+    Returns
+    -------
+    Region
+        Pieces with less than 1 % of the material are left out.
 
     Raises
     ------
@@ -252,8 +339,8 @@ def region_of(solid: Solid, shape: Shape, option: str = "--protect") -> Region:
     from scipy import ndimage
 
     bounds = solid.bounds
-    hull = shape.hull(bounds)
-    low, high = np.maximum(hull[0], bounds[0]), np.minimum(hull[1], bounds[1])
+    box = shape.bounding_box(bounds)
+    low, high = np.maximum(box[0], bounds[0]), np.minimum(box[1], bounds[1])
     if not (high > low).all():
         raise _nothing_there(shape, bounds, option)
     step = float((high - low).max()) / _REGION_STEPS
@@ -263,7 +350,7 @@ def region_of(solid: Solid, shape: Shape, option: str = "--protect") -> Region:
     size = np.ceil((high - low) / step).astype(np.int64)
     material = _material(solid, low, step, size)
     middles = low + step * (np.argwhere(material) + 0.5)
-    inside = shape.holds(middles, bounds)
+    inside = shape.contains(middles, bounds)
     material[tuple(np.argwhere(material)[~inside].T)] = False
     if not material.any():
         raise _nothing_there(shape, bounds, option)
@@ -273,12 +360,12 @@ def region_of(solid: Solid, shape: Shape, option: str = "--protect") -> Region:
     pieces = tuple(
         low + step * (np.argwhere(labels == piece) + 0.5)
         for piece in np.argsort(-sizes, kind="stable")[:count].tolist()
-        if sizes[piece] >= CRUMB * sizes.sum()
+        if sizes[piece] >= MIN_PIECE_SHARE * sizes.sum()
     )
     return Region(shape.text, pieces)
 
 
-def _painted(solid: Solid, shape: Shape, option: str) -> Points:
+def _painted(solid: Solid, shape: RegionText, option: str) -> Points:
     """Corners of the painted triangles of a colour, (k, 3, 3)."""
     paint = solid.paint
     if paint is None:
@@ -288,11 +375,11 @@ def _painted(solid: Solid, shape: Shape, option: str) -> Points:
         )
     if shape.colour is None:
         return paint.corners
-    near = np.abs(paint.colours.astype(int) - np.array(shape.colour)).max(axis=1) <= 8
+    near = np.abs(paint.colours.astype(int) - np.array(shape.colour)).max(axis=1) <= SAME_COLOUR
     if not near.any():
         known, times = np.unique(paint.colours, axis=0, return_counts=True)
         most = known[np.argsort(-times, kind="stable")[:6]]
-        names = ", ".join("#{:02x}{:02x}{:02x}".format(*colour) for colour in most.tolist())
+        names = ", ".join(hex_of_colour(colour) for colour in most.tolist())
         raise RecipeError(f"{option} {shape.text}: no face has this colour; there are {names}")
     return np.asarray(paint.corners[near])
 
@@ -301,9 +388,7 @@ def _samples(corners: Points, step: float) -> tuple[Points, Points, NDArray[np.f
     """Points about `step` apart on triangles, the triangles' normals and the area of each."""
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     parts = np.clip(np.ceil(edges / step), 1, 400).astype(int)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    twice = np.linalg.norm(cross, axis=1)
-    normal = cross / np.maximum(twice, 1e-300)[:, None]
+    normal, area = face_normals(corners)
     points, normals, weight = [], [], []
     for count in np.unique(parts).tolist():
         these = np.flatnonzero(parts == count)
@@ -320,11 +405,11 @@ def _samples(corners: Points, step: float) -> tuple[Points, Points, NDArray[np.f
         )
         points.append(here.reshape(-1, 3))
         normals.append(np.repeat(normal[these], len(share), axis=0))
-        weight.append(np.repeat(twice[these] / 2 / count**2, len(share)))
+        weight.append(np.repeat(area[these] / count**2, len(share)))
     return np.concatenate(points), np.concatenate(normals), np.concatenate(weight)
 
 
-def _painted_pieces(solid: Solid, shape: Shape, option: str) -> tuple[Points, ...]:
+def _painted_pieces(solid: Solid, shape: RegionText, option: str) -> tuple[Points, ...]:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -337,28 +422,31 @@ def _painted_pieces(solid: Solid, shape: Shape, option: str) -> tuple[Points, ..
     size = int(corner.max()) + 1
     graph = coo_array((np.ones(len(ends), dtype=np.int8), tuple(ends.T)), shape=(size, size))
     label = connected_components(graph, directed=False)[1][corner[:, 0]]
-    areas = np.bincount(
-        label,
-        np.linalg.norm(
-            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-        ),
-    )
+    areas = np.bincount(label, face_areas(corners))
     pieces = []
     for piece in np.argsort(-areas, kind="stable").tolist():
-        if areas[piece] >= CRUMB * areas.sum():
+        if areas[piece] >= MIN_PIECE_SHARE * areas.sum():
             points, normals, _ = _samples(corners[label == piece], extent / _PAINT_STEPS)
             pieces.append(points - 1e-3 * extent * normals)
     return tuple(pieces)
 
 
-def area_of(solid: Solid, shape: Shape | int, option: str = "--keep") -> Area:
+def sample_surface(solid: Solid, shape: RegionText | int, option: str = "--keep") -> SurfaceSamples:
     """Sample the surface of a model that is seen from a side, or that lies in a region.
 
     Parameters
     ----------
     solid : Solid
-    shape : Shape or int
+        The model.
+    shape : RegionText or int
         A region, or a side as an index of :data:`fabfold.lattice.rotations.FACES`.
+    option : str
+        What the error message calls the option that the region was given to.
+
+    Returns
+    -------
+    SurfaceSamples
+        About 160 along the model's longest side.
 
     Raises
     ------
@@ -374,14 +462,14 @@ def area_of(solid: Solid, shape: Shape | int, option: str = "--keep") -> Area:
     else:
         corners = np.asarray(solid.vertices)[solid.faces]
         points, normals, weight = _samples(corners, extent / _VIEW_STEPS)
-        inside = shape.holds(points, bounds)
+        inside = shape.contains(points, bounds)
         if not inside.any():
             raise _nothing_there(shape, bounds, option)
         points, normals, weight = points[inside], normals[inside], weight[inside]
-    return Area(points - 1e-3 * extent * normals, normals, weight)
+    return SurfaceSamples(points - 1e-3 * extent * normals, normals, weight)
 
 
-def _seen_from(solid: Solid, side: int) -> Area:
+def _seen_from(solid: Solid, side: int) -> SurfaceSamples:
     """What a look along an axis of the model meets first."""
     bounds = solid.bounds
     extent = bounds[1] - bounds[0]
@@ -397,7 +485,7 @@ def _seen_from(solid: Solid, side: int) -> Area:
         first = int(size[axis]) - 1 - first
     at = np.argwhere(hit)
     cells = np.insert(at, axis, first[hit], axis=1)
-    return Area(
+    return SurfaceSamples(
         low + step * (cells + 0.5),
         np.tile(FACES[side].astype(float), (len(cells), 1)),
         np.full(len(cells), step**2),

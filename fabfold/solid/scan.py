@@ -1,9 +1,10 @@
-"""From a closed mesh to subvoxels: an exact column scan, and box counts of the result.
+"""Scan conversion: from a closed mesh to subvoxels, and counts of subvoxels in boxes.
 
-The scan is watertight by construction. A mesh row (one y, one x after another) is cut out of every
-triangle by its directed edges, and an edge's crossing is computed from its two corners in the order
-of their indices, so that both triangles beside it get the same floating-point number. The signed
-intervals of a closed mesh therefore cancel exactly, whatever the rounding, and no column leaks.
+The scan is watertight by construction. Each triangle is cut by the rows of subvoxel centres (one y,
+one x after another) at its directed edges. Where a row crosses an edge is computed from the edge's
+two corners in the order of their indices, so both triangles beside it get the same floating-point
+number. The signed intervals of a closed mesh therefore cancel exactly, whatever the rounding, and
+no column leaks.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["box_counts", "occupancy", "summed_volume"]
+__all__ = ["box_counts", "box_counts_kernel", "scan_mesh", "summed_volume"]
 
 
 @njit(cache=True)
@@ -74,7 +75,7 @@ def _winding_steps(vertices, faces, nx, ny, nz):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _occupied(steps):  # type: ignore[no-untyped-def]
+def _inside(steps):  # type: ignore[no-untyped-def]
     nx, ny, nz = steps.shape
     result = np.zeros((nx, ny, nz), dtype=np.bool_)
     for i in range(nx):
@@ -105,7 +106,8 @@ def _summed(steps):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _box_counts(table, xs, ys, zs):  # type: ignore[no-untyped-def]
+def box_counts_kernel(table, xs, ys, zs):  # type: ignore[no-untyped-def]
+    """Compiled part of :func:`box_counts`, for other compiled functions; `planes` one by one."""
     counts = np.zeros((len(xs) - 1, len(ys) - 1, len(zs) - 1), dtype=np.int32)
     nx, ny, nz = table.shape[0] - 1, table.shape[1] - 1, table.shape[2] - 1
     for i in range(len(xs) - 1):
@@ -130,7 +132,7 @@ def _box_counts(table, xs, ys, zs):  # type: ignore[no-untyped-def]
     return counts
 
 
-def occupancy(
+def scan_mesh(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], shape: tuple[int, int, int]
 ) -> NDArray[np.bool_]:
     """Which subvoxels have their centre inside a closed mesh.
@@ -141,29 +143,39 @@ def occupancy(
     ----------
     vertices : (v, 3) float64 array
         In subvoxel units: subvoxel ``(i, j, k)`` is the unit cube with its centre at
-        ``(i, j, k) + 0.5``.
+        ``(i, j, k) + 0.5``, and its side is 1.
     faces : (f, 3) int32 array
         A closed mesh, counter-clockwise seen from outside.
     shape : three int
-        Subvoxels along x, y and z. Material below z = 0 or outside in x and y is not lost to the
-        winding number, it is only not recorded.
+        Subvoxels along x, y and z. The mesh may reach out of these: what lies below z = 0 still
+        counts for the winding number above it.
 
     Returns
     -------
     bool array of `shape`
+        True where there is material.
     """
-    return np.asarray(_occupied(_winding_steps(vertices, faces, *shape)))
+    return np.asarray(_inside(_winding_steps(vertices, faces, *shape)))
 
 
 def summed_volume(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], shape: tuple[int, int, int]
 ) -> NDArray[np.int32]:
-    """Summed volume table of :func:`occupancy`.
+    """Summed volume table of :func:`scan_mesh`.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+        In subvoxel units, as for :func:`scan_mesh`.
+    faces : (f, 3) int32 array
+        A closed mesh, counter-clockwise seen from outside.
+    shape : three int
+        Subvoxels along x, y and z.
 
     Returns
     -------
     int32 array, one longer than `shape` on each axis
-        Entry ``(i, j, k)`` counts the occupied subvoxels with all three indices below it.
+        Entry ``(i, j, k)`` counts the subvoxels with material whose three indices are all below it.
     """
     return np.asarray(_summed(_winding_steps(vertices, faces, *shape)))
 
@@ -172,7 +184,7 @@ def box_counts(
     table: NDArray[np.int32],
     planes: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
 ) -> NDArray[np.int32]:
-    """Occupied subvoxels in each box between neighbouring planes.
+    """Subvoxels with material in each box between neighbouring planes.
 
     Parameters
     ----------
@@ -184,5 +196,6 @@ def box_counts(
     Returns
     -------
     (len(x) - 1, len(y) - 1, len(z) - 1) int32 array
+        Numbers of subvoxels.
     """
-    return np.asarray(_box_counts(table, *planes))
+    return np.asarray(box_counts_kernel(table, *planes))

@@ -1,4 +1,4 @@
-"""Sew open rims: join vertices over small gaps, split edges that a neighbour's vertex lies on."""
+"""Sew cracks: join rim vertices over small gaps, split rim edges at vertices that lie on them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from fabfold.solid.topology import Edges, Faces, Points, proper
+from fabfold.meshes import drop_collapsed
+from fabfold.solid.topology import Edges, Faces, Points
 
 __all__ = ["sew", "split_rims", "weld_rims"]
 
@@ -26,15 +27,16 @@ def sew(vertices: Points, faces: Faces) -> tuple[Faces, float]:
     Parameters
     ----------
     vertices : (v, 3) float64 array
-        Longest side about 1.
+        Corner coordinates; the longest side is about 1.
     faces : (f, 3) int64 array
+        Three vertex indices for each triangle, of a welded mesh.
 
     Returns
     -------
     faces : (g, 3) int64 array
         Over the same vertices; the faces as they were where nothing is gained.
     tolerance : float
-        The tolerance that was needed, 0 if the faces are as they were.
+        The largest gap that was closed, 0 if the faces are as they were.
     """
     best, fewest, needed = faces, Edges.of(faces).odd, 0.0
     for tolerance in TOLERANCES:
@@ -55,7 +57,22 @@ def _rim(faces: Faces) -> NDArray[np.bool_]:
 
 
 def weld_rims(vertices: Points, faces: Faces, tolerance: float) -> Faces:
-    """Join vertices on open edges that lie within `tolerance` of each other."""
+    """Join vertices on open edges that lie within `tolerance` of each other.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+        Corner coordinates; the longest side is about 1.
+    faces : (f, 3) int64 array
+        Three vertex indices for each triangle.
+    tolerance : float
+        Largest distance of two vertices that are joined, in the unit of `vertices`.
+
+    Returns
+    -------
+    (g, 3) int64 array
+        Triangles over the same vertices, without those that collapsed.
+    """
     single = _rim(faces)
     rim = np.union1d(faces[single], np.roll(faces, -1, axis=1)[single])
     if len(rim) == 0:
@@ -68,13 +85,27 @@ def weld_rims(vertices: Points, faces: Faces, tolerance: float) -> Faces:
     _, first = np.unique(label, return_index=True)
     number = np.arange(len(vertices), dtype=np.int64)
     number[rim] = rim[first[label]]
-    return proper(number[faces])
+    return drop_collapsed(number[faces])
 
 
 def split_rims(vertices: Points, faces: Faces, tolerance: float) -> Faces:
     """Split faces along open edges at the rim vertices that lie on these edges.
 
     A face is split along one of its edges in a pass, so three passes reach all.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+        Corner coordinates; the longest side is about 1.
+    faces : (f, 3) int64 array
+        Three vertex indices for each triangle.
+    tolerance : float
+        Largest distance of a vertex from an edge that it splits, in the unit of `vertices`.
+
+    Returns
+    -------
+    (g, 3) int64 array
+        Triangles over the same vertices; `faces` itself where the rims have too many edges.
     """
     for _ in range(3):
         single = _rim(faces)
@@ -97,7 +128,7 @@ def split_rims(vertices: Points, faces: Faces, tolerance: float) -> Faces:
             return faces
         kept = np.ones(len(faces), dtype=bool)
         kept[sorted(gone)] = False
-        faces = proper(np.concatenate([faces[kept], np.array(fresh, dtype=np.int64)]))
+        faces = drop_collapsed(np.concatenate([faces[kept], np.array(fresh, dtype=np.int64)]))
     return faces
 
 

@@ -1,4 +1,4 @@
-"""Close a surface: drop what does not belong, wind it alike, cap its holes."""
+"""Close a surface: drop stray triangles, wind all others alike, cap the holes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import ModelError
+from fabfold.meshes import compact, face_areas, weld
 from fabfold.solid.polygon import triangulate_loop
 from fabfold.solid.sew import sew
-from fabfold.solid.topology import Edges, Faces, Points, face_areas, orient, patches, shells, weld
+from fabfold.solid.topology import Edges, Faces, Points, orient, patches, shells
 from fabfold.solid.words import were
 
 __all__ = ["OpenSurfaceError", "Shell", "close_surface"]
@@ -27,7 +28,15 @@ NO_AREA = 1e-14
 
 @dataclass(frozen=True)
 class Shell:
-    """One closed surface, as yet of either orientation."""
+    """One closed surface, as yet of either orientation.
+
+    Attributes
+    ----------
+    vertices : (v, 3) float64 array
+        Corner coordinates, all of them in use; the longest side of the model is about 1.
+    faces : (f, 3) int64 array
+        Three vertex indices for each triangle, wound alike.
+    """
 
     vertices: Points
     faces: Faces
@@ -45,14 +54,16 @@ def close_surface(name: str, vertices: Points, faces: Faces) -> tuple[list[Shell
     name : str
         Name of the file, for messages.
     vertices : (v, 3) float64 array
+        Corner coordinates; corners may be repeated.
     faces : (f, 3) int64 array
+        Three vertex indices for each triangle, wound either way.
 
     Returns
     -------
     shells : list of Shell
         Each closed by itself; they may overlap, nest, and be inside out.
     notes : list of str
-        What was done.
+        Sentences for the maker that say what was done.
 
     Raises
     ------
@@ -113,7 +124,7 @@ def _drop_repeated(faces: Faces, notes: list[str]) -> Faces:
 
 def _drop_flat(vertices: Points, faces: Faces, notes: list[str]) -> Faces:
     """Drop faces without area where the surface is more closed for it."""
-    flat = face_areas(vertices, faces) < NO_AREA
+    flat = face_areas(vertices[faces]) < NO_AREA
     if flat.any() and not flat.all():
         rest = faces[~flat]
         if Edges.of(rest).odd < Edges.of(faces).odd:
@@ -126,12 +137,7 @@ def _split(vertices: Points, faces: Faces) -> list[Shell]:
     label = shells(faces)
     order = np.argsort(label, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-    return [_shell(vertices, faces[part]) for part in parts]
-
-
-def _shell(vertices: Points, faces: Faces) -> Shell:
-    used, index = np.unique(faces.ravel(), return_inverse=True)
-    return Shell(vertices[used], index.reshape(-1, 3).astype(np.int64))
+    return [Shell(*compact(vertices, faces[part])) for part in parts]
 
 
 def _cap(vertices: Points, faces: Faces, notes: list[str]) -> list[Shell]:
@@ -139,26 +145,26 @@ def _cap(vertices: Points, faces: Faces, notes: list[str]) -> list[Shell]:
     label = patches(faces)
     order = np.argsort(label, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-    areas = face_areas(vertices, faces)
+    areas = face_areas(vertices[faces])
     found: list[Shell] = []
     sheets, sheet_area, holes, cap_area = 0, 0.0, 0, 0.0
     for part in parts:
         own = faces[part]
         edges = Edges.of(own)
         if edges.closed:
-            found.append(_shell(vertices, own))
+            found.append(Shell(*compact(vertices, own)))
             continue
         loops = _loops(own, edges)
         caps = [loop[triangulate_loop(vertices[loop])] for loop in loops]
         cap = np.concatenate(caps)
-        covered = float(face_areas(vertices, cap).sum())
+        covered = float(face_areas(vertices[cap]).sum())
         if covered > CAP_SHARE * areas[part].sum():
             sheets += 1
             sheet_area += float(areas[part].sum())
             continue
         holes += len(loops)
         cap_area += covered
-        found.append(_shell(vertices, np.concatenate([own, cap])))
+        found.append(Shell(*compact(vertices, np.concatenate([own, cap]))))
     share = sheet_area / float(areas.sum())
     if not found or share > SHEET_SHARE:
         raise OpenSurfaceError(

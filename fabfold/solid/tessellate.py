@@ -1,4 +1,4 @@
-"""Triangles of a CAD solid."""
+"""Triangles of a CAD solid, for STEP files and the samples."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ def tessellate(
     Parameters
     ----------
     shape : build123d.Shape
+        A solid, or faces.
     longest : float
         The longest side of the whole model, model units; accuracy goes by it.
     chord : float, optional
@@ -33,6 +34,7 @@ def tessellate(
     Returns
     -------
     vertices : (v, 3) float64 array
+        Corner coordinates in the unit of `shape`.
     faces : (f, 3) int64 array
         Counter-clockwise seen from outside; corners are repeated along the edges of faces, with
         the same coordinates up to rounding.

@@ -1,4 +1,4 @@
-"""Edges and shells of a triangle mesh, all by sorting and graph components.
+"""Edges, winding and shells of a triangle mesh, found by sorting and connected components.
 
 A surface is *closed* when every edge is passed as often one way as the other. This holds for
 ordinary edges of two faces, and also where two closed bodies meet in an edge of four.
@@ -13,17 +13,20 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from fabfold.meshes import triple_products
+
 __all__ = [
     "Edges",
-    "face_areas",
+    "Faces",
+    "Points",
     "orient",
     "patches",
-    "proper",
     "shells",
-    "weld",
 ]
 
+#: Three vertex indices for each triangle, shape (f, 3).
 Faces = NDArray[np.int64]
+#: Coordinates, shape (v, 3).
 Points = NDArray[np.float64]
 
 
@@ -50,7 +53,18 @@ class Edges:
 
     @classmethod
     def of(cls, faces: Faces) -> Edges:
-        """Find the edges of `faces`, an (f, 3) int64 array."""
+        """Find the edges of a mesh.
+
+        Parameters
+        ----------
+        faces : (f, 3) int64 array
+            Three vertex indices for each triangle.
+
+        Returns
+        -------
+        Edges
+            In the order of their smaller, then their larger vertex.
+        """
         start, end = faces, np.roll(faces, -1, axis=1)
         size = int(faces.max(initial=0)) + 1
         key = np.minimum(start, end) * size + np.maximum(start, end)
@@ -71,35 +85,6 @@ class Edges:
         return int((self.count % 2).sum())
 
 
-def weld(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
-    """Join vertices with exactly equal coordinates and drop faces that then repeat a vertex.
-
-    No tolerance: a model a nanometre long must not collapse.
-    """
-    points = vertices + 0.0  # -0.0 becomes 0.0
-    order = np.lexsort(points.T)
-    ranked = points[order]
-    fresh = np.ones(len(points), dtype=bool)
-    fresh[1:] = (ranked[1:] != ranked[:-1]).any(axis=1)
-    number = np.empty(len(points), dtype=np.int64)
-    number[order] = np.cumsum(fresh) - 1
-    return ranked[fresh], proper(number[faces])
-
-
-def proper(faces: Faces) -> Faces:
-    """The faces with three different vertices."""
-    a, b, c = faces.T
-    kept: Faces = faces[(a != b) & (b != c) & (c != a)]
-    return kept
-
-
-def face_areas(vertices: Points, faces: Faces) -> NDArray[np.float64]:
-    """Area of every face, shape (f,)."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    areas: NDArray[np.float64] = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    return areas
-
-
 def _pairs_of_faces(edges: Edges) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Faces joined by an edge of exactly two, shape (p, 2), and whether they are wound alike."""
     found = np.flatnonzero(edges.count[edges.of_side.ravel()] == 2)
@@ -109,7 +94,20 @@ def _pairs_of_faces(edges: Edges) -> tuple[NDArray[np.int64], NDArray[np.bool_]]
 
 
 def patches(faces: Faces, edges: Edges | None = None) -> NDArray[np.int64]:
-    """Label of every face; faces joined by an ordinary edge (of two faces) share one."""
+    """Faces that hang together over ordinary edges, those of exactly two faces.
+
+    Parameters
+    ----------
+    faces : (f, 3) int64 array
+        Three vertex indices for each triangle.
+    edges : Edges, optional
+        The edges of `faces`, where they are known already.
+
+    Returns
+    -------
+    (f,) int64 array
+        Number of the patch of each face, from 0.
+    """
     pairs, _ = _pairs_of_faces(edges or Edges.of(faces))
     return _components(len(faces), pairs)
 
@@ -123,9 +121,17 @@ def _components(count: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
 def orient(vertices: Points, faces: Faces) -> tuple[Faces, int, int]:
     """Wind the faces of every patch alike, and outwards.
 
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+        Corner coordinates, in any unit.
+    faces : (f, 3) int64 array
+        Three vertex indices for each triangle, wound either way.
+
     Returns
     -------
     faces : (f, 3) int64 array
+        The same triangles in the same order, some with their corners in reverse.
     turned : int
         Number of faces that were turned over.
     one_sided : int
@@ -156,7 +162,7 @@ def orient(vertices: Points, faces: Faces) -> tuple[Faces, int, int]:
         / np.maximum(np.bincount(patch), 1)[:, None]
     )
     corners = corners - middle[patch][:, None]
-    volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    volume = triple_products(corners)
     total = np.bincount(patch, weights=np.where(flip, -volume, volume))
     flip ^= total[patch] < 0
     one_sided = int((kept == turned).sum())
@@ -164,10 +170,20 @@ def orient(vertices: Points, faces: Faces) -> tuple[Faces, int, int]:
 
 
 def shells(faces: Faces) -> NDArray[np.int64]:
-    """Label of every face; each label is a set of faces that is closed by itself if possible.
+    """Sets of faces that are closed by themselves, as far as possible.
 
     Patches are taken as they are where they are closed; patches that only close together, at
     edges of more than two faces, are joined.
+
+    Parameters
+    ----------
+    faces : (f, 3) int64 array
+        Three vertex indices for each triangle.
+
+    Returns
+    -------
+    (f,) int64 array
+        Number of the shell of each face.
     """
     edges = Edges.of(faces)
     label = patches(faces, edges)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fabfold.errors import ModelError
 from fabfold.meshes import mesh_volume
-from fabfold.solid.convert import from_mesh_set, thinned, to_manifold, to_mesh, to_mesh_set
+from fabfold.solid.convert import decimated, from_mesh_set, to_manifold, to_mesh, to_mesh_set
 from fabfold.solid.surface import Shell
 from fabfold.solid.topology import Edges, Faces, Points
 from fabfold.solid.words import were
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_TRIANGLES", "unite"]
 
-#: Denser meshes are thinned: a box of some hundred voxels shows nothing of the rest.
+#: Denser meshes are decimated: a box of some hundred voxels shows nothing of the rest.
 MAX_TRIANGLES = 200_000
 #: A shell with less volume than this (longest side about 1) is flat.
 NO_VOLUME = 1e-12
-#: Self-crossings are resolved exactly up to this many triangles; denser meshes are thinned first.
+#: Self-crossings are resolved exactly up to this many triangles; denser meshes are decimated first.
 CROSSING_LIMIT = 50_000
 #: More crossing faces than this, if they are most of the mesh, take the exact way too long.
 TANGLE_LIMIT = 1_000
@@ -42,9 +42,9 @@ def unite(name: str, shells: Sequence[Shell], notes: list[str]) -> manifold3d.Ma
     name : str
         Name of the file, for messages.
     shells : sequence of Shell
-        Longest side of the whole about 1.
+        Closed surfaces of either orientation; the longest side of all together is about 1.
     notes : list of str
-        What was done is appended.
+        Sentences for the maker; what was done is appended.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def unite(name: str, shells: Sequence[Shell], notes: list[str]) -> manifold3d.Ma
     """
     import manifold3d
 
-    volumes = [mesh_volume(shell.vertices, shell.faces.astype(np.int32)) for shell in shells]
+    volumes = [mesh_volume(shell.vertices, shell.faces) for shell in shells]
     solid = [k for k in range(len(shells)) if abs(volumes[k]) > NO_VOLUME]
     if not solid:
         raise _no_volume(name)
@@ -136,7 +136,7 @@ def _sound(vertices: Points, faces: Faces) -> tuple[manifold3d.Manifold, bool]:
     tangled = False
     if good:
         if body.num_tri() > MAX_TRIANGLES:
-            body = thinned(body, MAX_TRIANGLES)
+            body = decimated(body, MAX_TRIANGLES)
             vertices, faces = to_mesh(body)
         # Where bodies share an edge, Manifold pairs its faces blindly: resolve these exactly.
         tangled = bool(Edges.of(faces).count.max() > 2)
@@ -146,7 +146,7 @@ def _sound(vertices: Points, faces: Faces) -> tuple[manifold3d.Manifold, bool]:
         if crossing > max(TANGLE_LIMIT, len(faces) // 2):
             return to_manifold(*wrap(vertices, faces)), True
         if body.num_tri() > CROSSING_LIMIT:
-            vertices, faces = to_mesh(thinned(body, CROSSING_LIMIT))
+            vertices, faces = to_mesh(decimated(body, CROSSING_LIMIT))
     try:
         clear = to_manifold(*_union_with_itself(vertices, faces))
     except pymeshlab.PyMeshLabException:

@@ -1,14 +1,14 @@
-"""Shrink-wrap a surface that is too open to be capped."""
+"""Wrap a closed skin round a surface that is too open to be capped."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fabfold.errors import ModelError
-from fabfold.meshes import mesh_volume
+from fabfold.meshes import face_areas, mesh_volume, weld
 from fabfold.solid.convert import from_mesh_set, to_mesh_set
 from fabfold.solid.surface import Shell
-from fabfold.solid.topology import Faces, Points, face_areas, weld
+from fabfold.solid.topology import Faces, Points
 
 __all__ = ["wrap", "wrap_surface"]
 
@@ -26,12 +26,16 @@ def wrap(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corner coordinates, in any unit.
     faces : (f, 3) int64 array
+        Three vertex indices for each triangle; they need not be joined.
 
     Returns
     -------
     vertices : (w, 3) float64 array
+        Corner coordinates of the skin, in the same unit.
     faces : (g, 3) int64 array
+        Its triangles, a closed manifold.
 
     References
     ----------
@@ -57,8 +61,9 @@ def wrap_surface(
     name : str
         Name of the file, for messages.
     vertices : (v, 3) float64 array
-        Longest side about 1.
+        Corner coordinates; the longest side is about 1.
     faces : (f, 3) int64 array
+        Three vertex indices for each triangle.
     reason : str
         Why the surface cannot be used as it is.
 
@@ -67,6 +72,7 @@ def wrap_surface(
     shells : list of Shell
         The one skin.
     notes : list of str
+        A sentence for the maker that says what was done.
 
     Raises
     ------
@@ -76,8 +82,8 @@ def wrap_surface(
     vertices, faces = weld(vertices, faces)
     skin, triangles = wrap(vertices, faces)
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    area = float(face_areas(skin, triangles).sum())
-    volume = mesh_volume(skin, triangles.astype(np.int32))
+    area = float(face_areas(skin[triangles]).sum())
+    volume = mesh_volume(skin, triangles)
     if 2 * volume < MIN_OFFSETS * OFFSET_PERCENT / 100 * diagonal * area:
         raise ModelError(
             f"{name} is not a closed surface: {reason}, and a skin wrapped round it encloses next "

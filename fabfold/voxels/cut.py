@@ -1,4 +1,4 @@
-"""From one placement of the grid to voxels: warp, sample, drop, keep what hangs together."""
+"""From one placement of the grid to voxels: warp, sample, drop small cells, keep one group."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from fabfold.lattice.rotations import parity
 from fabfold.meshes import mesh_volume
-from fabfold.solid.scan import occupancy
-from fabfold.voxels.features import RIGID_CONTACT, components, face_pairs, main_contact
-from fabfold.voxels.grid_placement import MEND_BELOW, Capacity
+from fabfold.solid.scan import scan_mesh
+from fabfold.voxels.features import RIGID_CONTACT, components, contact_counts, face_pairs
+from fabfold.voxels.grid_placement import SURPLUS_DROP_BELOW, Capacity
 from fabfold.voxels.offsets import CellEnergy
 from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 from fabfold.voxels.warp import warp_mesh
 
-__all__ = ["Placement", "colours_fit", "cut_voxels"]
+__all__ = ["Placement", "colour_surplus", "cut_voxels"]
 
 
 @dataclass(frozen=True)
@@ -44,13 +44,21 @@ class Placement:
     offsets: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
-def colours_fit(cells: NDArray[np.int32], capacity: Capacity) -> tuple[int, int]:
-    """Cells of colour 0 and 1 for which the template has no room, the better way round.
+def colour_surplus(cells: NDArray[np.int32], capacity: Capacity) -> tuple[int, int]:
+    """Cells of each checkerboard colour for which the template has no room.
 
     Parameters
     ----------
     cells : (n, 3) int32 array
+        Lattice coordinates.
     capacity : Capacity
+        What the template holds.
+
+    Returns
+    -------
+    (int, int)
+        Surplus of colour 0 and of colour 1, for the way to assign the model's colours to the
+        template's that leaves fewer cells over.
     """
     odd = int(parity(cells).sum())
     even = len(cells) - odd
@@ -67,7 +75,7 @@ def _largest_group(
     from scipy.sparse.csgraph import connected_components
 
     pairs = face_pairs(cells)
-    pairs = pairs[main_contact(cells, pairs, material) >= RIGID_CONTACT]
+    pairs = pairs[contact_counts(cells, pairs, material) >= RIGID_CONTACT]
     ones = np.ones(len(pairs), dtype=np.int8)
     graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(len(cells),) * 2)
     _, label = connected_components(graph, directed=False)
@@ -88,11 +96,13 @@ def cut_voxels(
     vertices : (v, 3) float64 array
         The model, model units.
     faces : (f, 3) int32 array
+        Three vertex indices for each triangle, closed and outward-oriented.
     placement : Placement
         Its planes enclose the whole model.
     energy : CellEnergy
         `drop_below` decides which cells are dropped.
     capacity : Capacity
+        What the template holds.
 
     Returns
     -------
@@ -113,7 +123,7 @@ def cut_voxels(
     )
     nx, ny, nz = (len(planes) - 1 for planes in regular)
     s = SUBDIVISION
-    grid = occupancy((warped - placement.first + 0.5) * s, warped_faces, (nx * s, ny * s, nz * s))
+    grid = scan_mesh((warped - placement.first + 0.5) * s, warped_faces, (nx * s, ny * s, nz * s))
     blocks = grid.reshape(nx, s, ny, s, nz, s).transpose(0, 2, 4, 1, 3, 5)
     fill = blocks.mean(axis=(3, 4, 5))
     total = float(fill.sum())
@@ -125,14 +135,14 @@ def cut_voxels(
         weight = fill[tuple(kept.T)]
         group = _largest_group(kept, components(subvoxels)[2], weight)
         kept, weight = kept[group], weight[group]
-        surplus = colours_fit(kept, capacity)
+        surplus = colour_surplus(kept, capacity)
         excess = sum(surplus)
         if excess == 0:
             break
         colour = parity(kept)
         doomed: list[int] = []
         for which in range(2):
-            small = np.flatnonzero((colour == which) & (weight < MEND_BELOW))
+            small = np.flatnonzero((colour == which) & (weight < SURPLUS_DROP_BELOW))
             order = small[np.argsort(weight[small], kind="stable")]
             doomed.extend(order[: surplus[which]].tolist())
         if len(doomed) < excess:

@@ -1,4 +1,4 @@
-"""What joints the material of the voxels can carry: contacts, hinge edges, ray depths.
+"""Which joints the material of the voxels can carry: contacts, hinge edges, ray depths.
 
 References
 ----------
@@ -22,9 +22,9 @@ __all__ = [
     "RIGID_CONTACT",
     "Features",
     "components",
+    "contact_counts",
     "face_pairs",
     "features",
-    "main_contact",
 ]
 
 #: Subvoxel contacts (of 400) between the main pieces of two voxels that hold them together as one
@@ -88,6 +88,7 @@ def components(
     Parameters
     ----------
     subvoxels : (n, s, s, s) bool array
+        Material in each cell.
 
     Returns
     -------
@@ -123,12 +124,12 @@ def face_pairs(cells: NDArray[np.int32]) -> NDArray[np.int32]:
     Parameters
     ----------
     cells : (n, 3) int32 array
-        Sorted lexicographically, no two the same.
+        Lattice coordinates, sorted lexicographically, no two the same.
 
     Returns
     -------
     (m, 2) int32 array
-        ``i < j``, sorted.
+        Indices ``i < j`` into `cells`, sorted.
     """
     low = cells.min(axis=0)
     shape = cells.max(axis=0) - low + 2
@@ -147,22 +148,24 @@ def _axes(cells: NDArray[np.int32], pairs: NDArray[np.int32]) -> NDArray[np.int6
     return np.asarray(np.argmax(cells[pairs[:, 1]] - cells[pairs[:, 0]], axis=1))
 
 
-def main_contact(
+def contact_counts(
     cells: NDArray[np.int32], pairs: NDArray[np.int32], material: NDArray[np.bool_]
 ) -> NDArray[np.int32]:
-    """Subvoxel pairs with material on both sides of the face that two cells share.
+    """Pairs of subvoxels with material on both sides of the face that two cells share.
 
     Parameters
     ----------
     cells : (n, 3) int32 array
+        Lattice coordinates.
     pairs : (m, 2) int32 array
         From :func:`face_pairs`.
     material : (n, s, s, s) bool array
-        All of the material, or only the main pieces.
+        Material in each cell: all of it, or only the largest piece.
 
     Returns
     -------
     (m,) int32 array
+        For each pair of cells, 0 to s².
     """
     contact = np.zeros(len(pairs), dtype=np.int32)
     axes = _axes(cells, pairs)
@@ -215,11 +218,12 @@ def _ray_depth(subvoxels: NDArray[np.bool_]) -> NDArray[np.float64]:
 
 
 def features(voxels: Voxels) -> Features:
-    """What the material of the voxels lets joints do.
+    """Find the contacts of the voxels and which joints they can carry.
 
     Parameters
     ----------
     voxels : Voxels
+        Cells and their material.
 
     Returns
     -------
@@ -231,11 +235,11 @@ def features(voxels: Voxels) -> Features:
         raise ValueError(f"subvoxels must be (n, 20, 20, 20), not {voxels.subvoxels.shape}")
     _, pieces, main = components(voxels.subvoxels)
     pairs = face_pairs(voxels.cells)
-    held = main_contact(voxels.cells, pairs, main)
+    held = contact_counts(voxels.cells, pairs, main)
     material = np.maximum(voxels.subvoxels.sum(axis=(1, 2, 3)), 1)
     return Features(
         pairs=pairs,
-        contact=main_contact(voxels.cells, pairs, voxels.subvoxels),
+        contact=contact_counts(voxels.cells, pairs, voxels.subvoxels),
         rigid=held >= RIGID_CONTACT,
         hinge=_hinge_edges(voxels.cells, pairs, main),
         double=held >= DOUBLE_CONTACT,

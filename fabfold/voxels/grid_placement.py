@@ -1,4 +1,4 @@
-"""Placements of the grid: rotations to try, and how good the cells of a placement are."""
+"""Placements of the grid: rotations to try, and how well the cells of a grid fit a template."""
 
 from __future__ import annotations
 
@@ -9,34 +9,42 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.solid.scan import _box_counts
+from fabfold.solid.scan import box_counts_kernel
 from fabfold.voxels.offsets import CellEnergy
 
 __all__ = [
-    "MEND_BELOW",
+    "SURPLUS_DROP_BELOW",
     "Capacity",
-    "Verdict",
+    "GridFit",
+    "grid_fit",
     "grid_rotations",
-    "judge",
     "nearby_rotations",
     "rank_translations",
 ]
 
-#: Cells with less material than this may be dropped where a template has no room for their colour.
-MEND_BELOW = 0.15
+#: Cells under this share of material may be dropped where a template has no room for their colour.
+SURPLUS_DROP_BELOW = 0.15
 
 
 @dataclass(frozen=True)
 class Capacity:
-    """How many cells a template holds: all, and of each checkerboard colour."""
+    """How many cells a template holds.
+
+    Attributes
+    ----------
+    cells : int
+        All of them.
+    colours : (int, int)
+        Those of checkerboard colour 0 and of colour 1.
+    """
 
     cells: int
     colours: tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What a placement comes to.
+class GridFit:
+    """How well the cells of a grid fit the model and the template.
 
     Attributes
     ----------
@@ -83,16 +91,18 @@ def grid_rotations(count: int, seed: int, vertices: NDArray[np.float64]) -> NDAr
     Parameters
     ----------
     count : int
-        At least 1.
+        Number of rotations, at least 1.
     seed : int
+        Of the random rotations.
     vertices : (v, 3) float64 array
-        The model, for its principal axes.
+        The model, for its principal axes; any unit.
 
     Returns
     -------
     (count, 3, 3) float64 array
-        The identity, the model's principal axes, then seeded random ones: every third keeps the
-        model upright (turned about z), the others are uniform over all rotations.
+        Matrices from model axes to lattice axes: the identity, the model's principal axes, then
+        seeded random ones. Every third of these keeps the model upright (turned about z), the
+        others are uniform over all rotations.
     """
     rng = np.random.default_rng([seed, 3])
     spread = vertices - vertices.mean(axis=0)
@@ -115,19 +125,23 @@ def grid_rotations(count: int, seed: int, vertices: NDArray[np.float64]) -> NDAr
 def nearby_rotations(
     rotations: NDArray[np.float64], count: int, seed: int, spread_deg: float
 ) -> NDArray[np.float64]:
-    """Small seeded turns of given rotations, each in its turn.
+    """Small random turns of given rotations.
 
     Parameters
     ----------
     rotations : (r, 3, 3) float64 array
+        Matrices from model axes to lattice axes.
     count : int
+        Number of turns; each of the rotations gets one after another.
     seed : int
+        Of the random turns.
     spread_deg : float
-        Standard deviation of the turn about each axis.
+        Standard deviation of the turn about each axis, degrees.
 
     Returns
     -------
     (count, 3, 3) float64 array
+        Matrices from model axes to lattice axes.
     """
     rng = np.random.default_rng([seed, 4])
     found = []
@@ -140,7 +154,7 @@ def nearby_rotations(
 
 @njit(cache=True)
 def _keep_largest(keep, fills, stack, labels):  # type: ignore[no-untyped-def]
-    """Clear `keep` everywhere but in the face-connected group with the most material."""
+    """Clear `keep` outside the face-connected group of cells with the most material."""
     nx, ny, nz = keep.shape
     labels[:] = 0
     group = 0
@@ -186,7 +200,7 @@ def _keep_largest(keep, fills, stack, labels):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _overfull(keep, colour0, colour1):  # type: ignore[no-untyped-def]
-    """Cells of each colour too many, the better way round, and the number of cells."""
+    """Surplus cells of each colour, the colours given the better way, and the number of cells."""
     nx, ny, nz = keep.shape
     even = 0
     odd = 0
@@ -206,10 +220,10 @@ def _overfull(keep, colour0, colour1):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _mend(keep, fills, colour, surplus, below):  # type: ignore[no-untyped-def]
+def _drop_surplus(keep, fills, colour, surplus, below):  # type: ignore[no-untyped-def]
     """Drop up to `surplus` of the smallest cells of one colour; whether there was one."""
     nx, ny, nz = fills.shape
-    mended = False
+    dropped = False
     for _ in range(surplus):
         low = below
         a = b = c = -1
@@ -222,12 +236,12 @@ def _mend(keep, fills, colour, surplus, below):  # type: ignore[no-untyped-def]
         if a < 0:
             break
         keep[a, b, c] = False
-        mended = True
-    return mended
+        dropped = True
+    return dropped
 
 
 @njit(cache=True)
-def _judge(fills, energy, capacity, mend_below, keep, stack, labels):  # type: ignore[no-untyped-def]
+def _grid_fit(fills, energy, capacity, drop_surplus_below, keep, stack, labels):  # type: ignore[no-untyped-def]
     """Decide which cells stay; (score, kept, fill, slivers, lost, excess)."""
     share = fills.reshape(-1)
     kept_share = keep.reshape(-1)
@@ -243,10 +257,10 @@ def _judge(fills, energy, capacity, mend_below, keep, stack, labels):  # type: i
         _keep_largest(keep, fills, stack, labels)
         even, odd, _kept = _overfull(keep, capacity[1], capacity[2])
         if even + odd == 0 or even + odd > 4 + capacity[0] // 16:
-            break  # it fits, or is too far from it to be mended
-        mended = _mend(keep, fills, 0, even, mend_below)
-        mended = _mend(keep, fills, 1, odd, mend_below) or mended
-        if not mended:
+            break  # it fits, or is too far from it for dropping small cells to help
+        dropped = _drop_surplus(keep, fills, 0, even, drop_surplus_below)
+        dropped = _drop_surplus(keep, fills, 1, odd, drop_surplus_below) or dropped
+        if not dropped:
             break
     _keep_largest(keep, fills, stack, labels)
     even, odd, kept = _overfull(keep, capacity[1], capacity[2])
@@ -262,8 +276,8 @@ def _judge(fills, energy, capacity, mend_below, keep, stack, labels):  # type: i
 
 
 @njit(cache=True)
-def _rank(table, pitch, steps, energy, capacity, mend_below, excess_cost):  # type: ignore[no-untyped-def]
-    """Verdict on every translation of a grid of `pitch` subvoxels; (steps**3, 4)."""
+def _rank_translations(table, pitch, steps, energy, capacity, drop_surplus_below, excess_cost):  # type: ignore[no-untyped-def]
+    """Fit of every translation of a grid of `pitch` subvoxels; (steps**3, 4)."""
     size = np.array([table.shape[0] - 1, table.shape[1] - 1, table.shape[2] - 1])
     cells = np.zeros(3, dtype=np.int64)
     for axis in range(3):
@@ -285,16 +299,16 @@ def _rank(table, pitch, steps, energy, capacity, mend_below, excess_cost):  # ty
             ys[i] = math.floor((i - shift[1] / steps) * pitch + 0.5)
         for i in range(cells[2] + 1):
             zs[i] = math.floor((i - shift[2] / steps) * pitch + 0.5)
-        fills = _box_counts(table, xs, ys, zs) / volume
-        verdict = _judge(fills, energy, capacity, mend_below, keep, stack, labels)
-        result[row, 0] = verdict[0] - excess_cost * verdict[5]
-        result[row, 1] = verdict[1]
-        result[row, 2] = verdict[5]
-        result[row, 3] = verdict[4] / max(verdict[2] + verdict[4], 1e-300)
+        fills = box_counts_kernel(table, xs, ys, zs) / volume
+        fit = _grid_fit(fills, energy, capacity, drop_surplus_below, keep, stack, labels)
+        result[row, 0] = fit[0] - excess_cost * fit[5]
+        result[row, 1] = fit[1]
+        result[row, 2] = fit[5]
+        result[row, 3] = fit[4] / max(fit[2] + fit[4], 1e-300)
     return result
 
 
-def judge(fills: NDArray[np.float64], energy: CellEnergy, capacity: Capacity) -> Verdict:
+def grid_fit(fills: NDArray[np.float64], energy: CellEnergy, capacity: Capacity) -> GridFit:
     """Drop what is too small, keep one connected group, and fit the template's colours.
 
     Parameters
@@ -302,26 +316,28 @@ def judge(fills: NDArray[np.float64], energy: CellEnergy, capacity: Capacity) ->
     fills : (a, b, c) float64 array
         Share of each cell that is material.
     energy : CellEnergy
+        Which cells are dropped, and what slivers and lost material cost.
     capacity : Capacity
+        What the template holds.
 
     Returns
     -------
-    Verdict
-        Cells under `MEND_BELOW` are dropped where their colour is over-full; what is still too much
-        is the verdict's `excess`.
+    GridFit
+        Cells under `SURPLUS_DROP_BELOW` are dropped where their colour is over-full; what is still
+        too much is `excess`.
     """
     keep = np.zeros(fills.shape, dtype=bool)
-    found = _judge(
+    found = _grid_fit(
         np.ascontiguousarray(fills, dtype=np.float64),
         energy.arguments(),
         (capacity.cells, *capacity.colours),
-        MEND_BELOW,
+        SURPLUS_DROP_BELOW,
         keep,
         np.zeros(fills.size, dtype=np.int64),
         np.zeros(fills.shape, dtype=np.int32),
     )
     score, kept, fill, slivers, lost, excess = found
-    return Verdict(
+    return GridFit(
         score=float(score),
         kept=int(kept),
         fill=float(fill),
@@ -352,7 +368,9 @@ def rank_translations(
         Translations along each axis: row ``(a * steps + b) * steps + c`` puts the first planes at
         ``-(a, b, c) / steps`` of a cell.
     energy : CellEnergy
+        Which cells are dropped, and what slivers and lost material cost.
     capacity : Capacity
+        What the template holds.
     excess_cost : float
         Taken off the score for each cell too many. It is mild, because moving the planes afterwards
         empties many small cells.
@@ -363,13 +381,13 @@ def rank_translations(
         Score, cells kept, cells too many, and the share of the material that is lost.
     """
     return np.asarray(
-        _rank(
+        _rank_translations(
             table,
             float(pitch),
             steps,
             energy.arguments(),
             (capacity.cells, *capacity.colours),
-            MEND_BELOW,
+            SURPLUS_DROP_BELOW,
             float(excess_cost),
         )
     )

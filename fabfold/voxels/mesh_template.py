@@ -1,4 +1,4 @@
-"""A mesh as the target shape: cut into the cells of a template."""
+"""A template from a mesh: the cells that fill the mesh best."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ def template_of_solid(solid: Solid, cells: int | None = None) -> Template:
     Parameters
     ----------
     solid : Solid
+        The mesh.
     cells : int, optional
         Number of cells wanted; what comes out is the best match within a tenth of it, or the
         nearest number that the mesh allows. By default the best match from 32 to 128 cells.

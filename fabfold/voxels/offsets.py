@@ -60,7 +60,7 @@ class CellEnergy:
     move_cost: float = 1e-4
 
     def arguments(self) -> tuple[float, float, float, float]:
-        """The first four, in order, for the kernels."""
+        """All but `move_cost`, in order, for compiled functions."""
         return (self.drop_below, self.sliver_below, self.sliver_cost, self.loss_cost)
 
 
@@ -73,7 +73,7 @@ class Offsets:
     planes : three int64 arrays
         Plane positions after the move, in subvoxels.
     offsets : three int64 arrays
-        How far each plane was moved.
+        How far each plane was moved, in subvoxels.
     energies : tuple of float
         Energy before the first sweep and after each direction of each sweep; never increases.
     """
@@ -82,14 +82,38 @@ class Offsets:
     offsets: Planes
     energies: tuple[float, ...]
 
-    def effort(self, energy: CellEnergy) -> float:
-        """What the moves cost by themselves."""
+    def cost_of_moves(self, energy: CellEnergy) -> float:
+        """What the moves cost by themselves.
+
+        Parameters
+        ----------
+        energy : CellEnergy
+            Its `move_cost` is the price.
+
+        Returns
+        -------
+        float
+            To be added to the energy of the cells.
+        """
         return energy.move_cost * sum(float((axis**2).sum()) for axis in self.offsets)
 
 
 @njit(cache=True)
 def cell_energy(fill, drop_below, sliver_below, sliver_cost, loss_cost):  # type: ignore[no-untyped-def]
-    """Energy of one cell with the given share of material; see :class:`CellEnergy`."""
+    """Energy of one cell, compiled; see :class:`CellEnergy`.
+
+    Parameters
+    ----------
+    fill : float
+        Share of the cell that is material.
+    drop_below, sliver_below, sliver_cost, loss_cost : float
+        As in :class:`CellEnergy`.
+
+    Returns
+    -------
+    float
+        0 for an empty or a full cell.
+    """
     if fill <= 0.0:
         return 0.0
     if fill < drop_below:
@@ -180,16 +204,18 @@ def best_axis_offsets(
     regular : three int64 arrays
         The planes of the regular grid, in subvoxels.
     offsets : three int64 arrays
-        Where they stand now; those of `axis` do not matter.
+        How far each plane is moved now, in subvoxels; those of `axis` do not matter.
     axis : int
+        0, 1 or 2: the direction whose planes move.
     limit : int
-        A plane moves by at most this, and a spacing changes by at most this.
+        Subvoxels by which a plane may move, and by which a spacing may change.
     energy : CellEnergy
+        What a cell costs.
 
     Returns
     -------
     offsets : int64 array
-        The outermost two planes never move.
+        How far each plane of `axis` moves, in subvoxels; the outermost two never move.
     energy : float
         Of all cells, the cost of this direction's moves included.
     """
@@ -219,14 +245,16 @@ def optimise_offsets(
     regular : three int64 arrays
         The planes of the regular grid, in subvoxels; the outermost ones do not move.
     limit : int
-        A plane moves by at most this, and a spacing changes by at most this; 0 moves nothing.
+        Subvoxels by which a plane may move, and by which a spacing may change; 0 moves nothing.
     energy : CellEnergy
+        What a cell costs.
     sweeps : int
         Most sweeps over the three directions; 2 to 5 are enough for most models.
 
     Returns
     -------
     Offsets
+        The moves and the energy after each of them.
     """
     offsets = [np.zeros_like(planes) for planes in regular]
 

@@ -1,8 +1,8 @@
-"""The rounds of the placement search, each on fewer placements and with more care.
+"""The search for grid placements in rounds, from many on coarse scans to few on fine ones.
 
 Every rotation is scanned coarsely once, and all pitches and translations are read off its summed
-volume table. The best are scanned at 20 x 20 x 20 and get their planes moved; the best of those are
-tried again at pitches in between.
+volume table. The best grids are scanned at 20 x 20 x 20 and get their planes moved. The best of
+those are tried again at pitches in between.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from fabfold.lattice.template import Template
 from fabfold.progress import Progress
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.scan import box_counts, summed_volume
-from fabfold.voxels.cut import Placement
+from fabfold.voxels.cut import Placement, cut_voxels
 from fabfold.voxels.grid_placement import (
     Capacity,
-    Verdict,
-    judge,
+    GridFit,
+    grid_fit,
     nearby_rotations,
     rank_translations,
 )
 from fabfold.voxels.offsets import CellEnergy, Offsets, optimise_offsets
-from fabfold.voxels.voxel_model import SUBDIVISION
+from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 
-__all__ = ["Ranked", "Refinement", "Tried"]
+__all__ = ["PITCHES", "RankedGrid", "RefinedGrid", "Refinement"]
 
 #: Subvoxels along a voxel in the first round.
 _COARSE = 10
@@ -39,10 +39,10 @@ _FINE_LIMIT = 40_000_000
 #: Pitches of the second round, in twentieths of the pitch that the first round chose.
 PITCHES = (17, 18, 19, 20, 21)
 #: Pitches of the third round, as shares of the best so far.
-NEARBY = (0.962, 0.975, 0.9875, 1.0125, 1.025)
+_NEARBY = (0.962, 0.975, 0.9875, 1.0125, 1.025)
 #: Taken off the score for a cell too many once the planes are moved: more than a full cell brings.
 _EXCESS_COST = 2.0
-#: Rotations of which small turns are tried, and how small these are.
+#: Rotations of which small turns are tried, and the standard deviation of these turns, degrees.
 _CENTRES = 10
 _SPREAD_DEG = 4.0
 #: Rotations that a search for fewer cells takes over from one for more.
@@ -56,15 +56,16 @@ _MOVED = 4
 
 
 @dataclass(frozen=True)
-class Ranked:
-    """A placement of the regular grid and its score.
+class RankedGrid:
+    """A regular grid, and its score on a coarse scan once its planes are moved there.
 
     Attributes
     ----------
     score : float
-        See :class:`fabfold.voxels.grid_placement.Verdict`; excess cells are taken off.
+        That of :class:`fabfold.voxels.grid_placement.GridFit`, less a price for each excess cell;
+        higher is better.
     rotation : int
-        Index of the rotation.
+        Index into :attr:`Refinement.rotations`.
     pitch : float
         Side of a voxel, model units.
     origin : three floats
@@ -78,19 +79,29 @@ class Ranked:
 
 
 @dataclass(frozen=True)
-class Tried:
-    """A placement with its planes moved, and what it comes to."""
+class RefinedGrid:
+    """A grid with its planes moved on a fine scan, and how it fits.
 
-    verdict: Verdict
+    Attributes
+    ----------
+    fit : GridFit
+        How well its cells fit the model and the template.
+    rotation : int
+        Index into :attr:`Refinement.rotations`.
+    placement : Placement
+        The grid, its planes moved.
+    """
+
+    fit: GridFit
     rotation: int
     placement: Placement
 
     @property
-    def order(self) -> tuple[int, float]:
-        """Sort key: those that fit first, best first; then those that nearly fit."""
-        if self.verdict.excess == 0:
-            return (0, -self.verdict.score)
-        return (1, float(self.verdict.excess))
+    def sort_key(self) -> tuple[int, float]:
+        """Orders grids: those that fit come first, by score; then the others, by excess cells."""
+        if self.fit.excess == 0:
+            return (0, -self.fit.score)
+        return (1, float(self.fit.excess))
 
 
 def _shift(row: int) -> NDArray[np.int64]:
@@ -99,16 +110,31 @@ def _shift(row: int) -> NDArray[np.int64]:
 
 
 class Refinement:
-    """One search: a model, a template and the rotations to try.
+    """Search for placements of one model's grid: rank many, refine the best.
 
     Parameters
     ----------
     solid : Solid
+        The model.
     template : Template
+        The target shape, which limits the number of cells of each colour.
     rotations : (r, 3, 3) float64 array
+        Matrices from model axes to lattice axes, to be tried.
     energy : CellEnergy
+        What a cell costs, and which cells are dropped.
     limit : int
         Subvoxels by which a plane may move.
+
+    Attributes
+    ----------
+    rotations : (r, 3, 3) float64 array
+        Those given, and the small turns that :meth:`rank` adds.
+    family : list of int
+        For each rotation the one that it is a small turn of; the given ones are their own.
+    capacity : Capacity
+        What the template holds.
+    volume, extent : float
+        Volume of the model and its longest side, in (cubic) model units.
     """
 
     def __init__(
@@ -126,13 +152,23 @@ class Refinement:
         self.template = template
         self.capacity = Capacity(len(template), template.colours)
         self.rotations = rotations
-        #: The rotation that each one is a small turn of; the given ones are their own.
         self.family = list(range(len(rotations)))
         self.energy = energy
         self.limit = limit
 
     def with_share(self, share: float) -> Refinement:
-        """The same search for a share of the template's cells of each colour."""
+        """The same search for a part of the template only.
+
+        Parameters
+        ----------
+        share : float
+            Share of the template's cells of each colour, from 0 to 1.
+
+        Returns
+        -------
+        Refinement
+            With the same rotations.
+        """
         other = copy(self)
         even, odd = (int(share * cells) for cells in self.capacity.colours)
         other.capacity = Capacity(even + odd, (even, odd))
@@ -153,6 +189,11 @@ class Refinement:
         The smallest has every cell of the template full; or, since a chain of n cells that touch
         face to face is at most n cells long, has the model just as long. The largest cuts the model
         into halves, or leaves one cell in twenty full.
+
+        Returns
+        -------
+        low, high : float
+            In model units.
         """
         full = float(np.cbrt(self.volume / self.capacity.cells))
         low = max(full, self.extent / (self.capacity.cells + 2))
@@ -161,10 +202,19 @@ class Refinement:
     def pilot(self, max_loss: float, rotations: int = 9) -> tuple[float | None, str]:
         """A pitch that about fills the template, from the first rotations.
 
+        Parameters
+        ----------
+        max_loss : float
+            Largest share of the model's volume that may be lost in dropped cells; twice as much
+            may be lost here, where no plane is moved yet.
+        rotations : int
+            How many rotations to look at.
+
         Returns
         -------
         pitch : float or None
-            The median over the rotations of the smallest pitch that fits; None if none does.
+            The median over the rotations of the smallest pitch that fits, model units; None if
+            none does.
         nearest : str
             The placement with the least loss, in words.
         """
@@ -192,20 +242,28 @@ class Refinement:
                 found.append(best)
         return (float(np.median(found)) if found else None), nearest[1]
 
-    def first(
+    def rank(
         self, pitches: NDArray[np.float64], nearby: int, seed: int, progress: Progress
-    ) -> list[Ranked]:
-        """Rank placements on coarse scans: the best two of each rotation, best first.
+    ) -> list[RankedGrid]:
+        """Rank grids of all rotations on coarse scans.
 
         Parameters
         ----------
         pitches : (p,) float64 array
+            Sides of a voxel to try, model units.
         nearby : int
             Small turns of the best rotations to go on with; they are added to `rotations`.
         seed : int
+            Of these turns.
         progress : Progress
+            Hears of every sixteenth rotation.
+
+        Returns
+        -------
+        list of RankedGrid
+            The best two of each rotation, best first.
         """
-        ranked: list[Ranked] = []
+        ranked: list[RankedGrid] = []
         given = len(self.rotations)
         count = given + nearby
         for index in range(count):
@@ -226,15 +284,30 @@ class Refinement:
         ranked.sort(key=lambda item: -item.score)
         return ranked
 
-    def again(self, ranked: Sequence[Ranked], pitches: NDArray[np.float64]) -> list[Ranked]:
-        """Rank the rotations that did best in another search: the best grid of each, best first."""
+    def rank_again(
+        self, ranked: Sequence[RankedGrid], pitches: NDArray[np.float64]
+    ) -> list[RankedGrid]:
+        """Rank grids of the rotations that did best in another search.
+
+        Parameters
+        ----------
+        ranked : sequence of RankedGrid
+            What :meth:`rank` of the other search gave, best first.
+        pitches : (p,) float64 array
+            Sides of a voxel to try, model units.
+
+        Returns
+        -------
+        list of RankedGrid
+            The best one of each rotation, best first.
+        """
         best = list(dict.fromkeys(item.rotation for item in ranked))[:_AGAIN]
         found = [
             max(self._ranked(rotation, pitches), key=lambda item: item.score) for rotation in best
         ]
         return sorted(found, key=lambda item: -item.score)
 
-    def _ranked(self, rotation: int, pitches: NDArray[np.float64]) -> list[Ranked]:
+    def _ranked(self, rotation: int, pitches: NDArray[np.float64]) -> list[RankedGrid]:
         """The best grids of one rotation, their planes moved, on one coarse scan."""
         table, side, low = self._coarse(rotation, float(pitches.min()) / _COARSE)
         found: list[tuple[float, float, int]] = []
@@ -273,7 +346,7 @@ class Refinement:
         rotation: int,
         pitch: float,
         row: int,
-    ) -> Ranked:
+    ) -> RankedGrid:
         """Move the planes on a coarse scan, to foresee what the fine one will come to."""
         step = pitch / side
         start = -_shift(row) / _STEPS * step
@@ -285,36 +358,42 @@ class Refinement:
         ]
         limit = int(self.limit / SUBDIVISION * step)
         moved = optimise_offsets(table, (regular[0], regular[1], regular[2]), limit, self.energy, 3)
-        verdict = self._verdict(table, moved, side, pitch)
+        fit = self._fit(table, moved, side, pitch)
         # The first planes are half a cell before lattice 0.
         x, y, z = (low + start * side + 0.5 * pitch).tolist()
-        score = verdict.score - _EXCESS_COST * verdict.excess
-        return Ranked(score, rotation, pitch, (x, y, z))
+        score = fit.score - _EXCESS_COST * fit.excess
+        return RankedGrid(score, rotation, pitch, (x, y, z))
 
-    def _verdict(
-        self, table: NDArray[np.int32], moved: Offsets, side: float, pitch: float
-    ) -> Verdict:
-        """Judge a grid whose planes were moved.
+    def _fit(self, table: NDArray[np.int32], moved: Offsets, side: float, pitch: float) -> GridFit:
+        """How well a grid fits after its planes were moved.
 
         Its score pays for the moves, and for material that the samples add or miss: flat faces
         along the grid can be off by half a subvoxel each, all to the same side.
         """
         widths = [np.diff(positions).astype(float) for positions in moved.planes]
         size = widths[0][:, None, None] * widths[1][:, None] * widths[2]
-        verdict = judge(box_counts(table, moved.planes) / size, self.energy, self.capacity)
+        fit = grid_fit(box_counts(table, moved.planes) / size, self.energy, self.capacity)
         missed = abs(float(table[-1, -1, -1]) * side**3 - self.volume) / pitch**3
-        return replace(verdict, score=verdict.score - missed - moved.effort(self.energy))
+        return replace(fit, score=fit.score - missed - moved.cost_of_moves(self.energy))
 
-    def second(self, item: Ranked, pitches: tuple[int, ...], hold_origin: bool) -> list[Tried]:
-        """Scan a placement at 20 x 20 x 20 and move the planes of several grids near it.
+    def refine(
+        self, item: RankedGrid, pitches: tuple[int, ...], hold_origin: bool
+    ) -> list[RefinedGrid]:
+        """Scan at 20 x 20 x 20 and move the planes of several grids near a ranked one.
 
         Parameters
         ----------
-        item : Ranked
+        item : RankedGrid
+            The grid to start from.
         pitches : tuple of int
-            In twentieths of its pitch.
+            Sides of a voxel to try, in twentieths of the pitch of `item`.
         hold_origin : bool
             Try no other translation; `pitches` must be ``(20,)``.
+
+        Returns
+        -------
+        list of RefinedGrid
+            In the order in which they were tried; empty where a scan would take too much memory.
         """
         rotation = self.rotations[item.rotation]
         vertices = self.vertices @ rotation.T
@@ -350,7 +429,7 @@ class Refinement:
         side: float,
         units: int,
         shift: NDArray[np.int64],
-    ) -> Tried:
+    ) -> RefinedGrid:
         """Move the planes of the grid of pitch `units` whose first planes are at `shift`."""
         regular = []
         for axis in range(3):
@@ -360,7 +439,7 @@ class Refinement:
         limit = self.limit * units // SUBDIVISION
         moved = optimise_offsets(table, (regular[0], regular[1], regular[2]), limit, self.energy)
         pitch = units * side
-        verdict = self._verdict(table, moved, side, pitch)
+        fit = self._fit(table, moved, side, pitch)
         offsets = [moved.offsets[axis] / units for axis in range(3)]
         placement = Placement(
             rotation=self.rotations[rotation],
@@ -369,19 +448,49 @@ class Refinement:
             first=np.full(3, -1, dtype=np.int64),
             offsets=(offsets[0], offsets[1], offsets[2]),
         )
-        return Tried(verdict, rotation, placement)
+        return RefinedGrid(fit, rotation, placement)
 
-    def third(self, tried: Tried) -> list[Tried]:
-        """Try pitches in between, the grid scaled about the model's middle."""
-        placement = tried.placement
+    def refine_pitch(self, grid: RefinedGrid) -> list[RefinedGrid]:
+        """Try pitches in between, the grid scaled about the model's middle.
+
+        Parameters
+        ----------
+        grid : RefinedGrid
+            The grid to scale.
+
+        Returns
+        -------
+        list of RefinedGrid
+            In the order in which they were tried.
+        """
+        placement = grid.placement
         vertices = self.vertices @ placement.rotation.T
         middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
         found = []
-        for factor in NEARBY:
+        for factor in _NEARBY:
             x, y, z = (middle + factor * (placement.origin - middle)).tolist()
-            item = Ranked(0.0, tried.rotation, placement.pitch * factor, (x, y, z))
-            found.extend(self.second(item, (SUBDIVISION,), hold_origin=False))
+            item = RankedGrid(0.0, grid.rotation, placement.pitch * factor, (x, y, z))
+            found.extend(self.refine(item, (SUBDIVISION,), hold_origin=False))
         return found
+
+    def cut(self, grid: RefinedGrid) -> tuple[Voxels | None, int, int]:
+        """Cut the model into voxels; see :func:`fabfold.voxels.cut.cut_voxels`.
+
+        Parameters
+        ----------
+        grid : RefinedGrid
+            Where to cut.
+
+        Returns
+        -------
+        voxels : Voxels or None
+            None if the template cannot hold the cells, or no cell is left.
+        kept : int
+            Cells with enough material, in one group.
+        excess : int
+            Cells for which the template has no room; 0 if it holds them all.
+        """
+        return cut_voxels(self.vertices, self.faces, grid.placement, self.energy, self.capacity)
 
 
 def _shape(extent: NDArray[np.float64], side: float) -> tuple[int, int, int]:

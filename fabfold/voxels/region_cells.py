@@ -1,4 +1,4 @@
-"""Regions of a model on the grid: the cells they fall into, the voxels that hold points."""
+"""Regions of a model on the grid: into how many cells they are cut, which voxel holds a point."""
 
 from __future__ import annotations
 
@@ -7,18 +7,31 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.solid.regions import CRUMB, Points, Region
+from fabfold.solid.regions import MIN_PIECE_SHARE, Points, Region
 from fabfold.voxels.cut import Placement
 from fabfold.voxels.voxel_model import Voxels
 
-__all__ = ["owners", "spread", "to_lattice"]
+__all__ = ["containing_voxels", "region_cut_cost", "to_lattice"]
 
-#: Price of a cell more for a region, in full cells: that of a sliver.
+#: Price of each cell after the first that a region falls into, in full cells: that of a sliver.
 _CUT_COST = 0.5
 
 
-def spread(regions: Sequence[Region], placement: Placement) -> float:
-    """Price of the cells into which a placement of the grid divides regions, 0.5 for each cut."""
+def region_cut_cost(regions: Sequence[Region], placement: Placement) -> float:
+    """Price of cutting regions into cells.
+
+    Parameters
+    ----------
+    regions : sequence of Region
+        Parts of the model that shall lie in few cells.
+    placement : Placement
+        The grid, its planes moved.
+
+    Returns
+    -------
+    float
+        In full cells: 0.5 for each cell after the first that a piece of a region falls into.
+    """
     cuts = 0
     for region in regions:
         for points in region.pieces:
@@ -29,18 +42,24 @@ def spread(regions: Sequence[Region], placement: Placement) -> float:
                 planes = placement.first[axis] - 0.5 + np.arange(len(offsets)) + offsets
                 cell[:, axis] = np.searchsorted(planes, at[:, axis])
             sizes = np.unique(cell, axis=0, return_counts=True)[1]
-            cuts += int((sizes >= CRUMB * len(some)).sum()) - 1
+            cuts += int((sizes >= MIN_PIECE_SHARE * len(some)).sum()) - 1
     return _CUT_COST * cuts
 
 
 def to_lattice(voxels: Voxels, points: Points) -> Points:
-    """Where points of the model come to lie in the warped lattice of shape A.
+    """Warp points of the model into the lattice of shape A.
 
     Parameters
     ----------
     voxels : Voxels
+        Their rotation, origin, pitch and plane offsets make the warp.
     points : (k, 3) float64 array
-        Model units.
+        Model axes and units.
+
+    Returns
+    -------
+    (k, 3) float64 array
+        Lattice units of shape A.
     """
     regular = (np.asarray(points) @ voxels.rotation.T - voxels.origin) / voxels.pitch
     out = np.empty_like(regular)
@@ -55,8 +74,21 @@ def to_lattice(voxels: Voxels, points: Points) -> Points:
     return out
 
 
-def owners(voxels: Voxels, points: Points) -> NDArray[np.int32]:
-    """Voxel that holds each point of the model (k, 3); -1 where no voxel does."""
+def containing_voxels(voxels: Voxels, points: Points) -> NDArray[np.int32]:
+    """Find the voxel that holds each of some points of the model.
+
+    Parameters
+    ----------
+    voxels : Voxels
+        The cells to look in.
+    points : (k, 3) float64 array
+        Model axes and units.
+
+    Returns
+    -------
+    (k,) int32 array
+        Index of the voxel; -1 where no voxel holds the point.
+    """
     cell = np.floor(to_lattice(voxels, points) + 0.5).astype(np.int64)
     size = voxels.cells.max(axis=0) + 1
     index = np.full(size, -1, dtype=np.int32)

@@ -36,6 +36,7 @@ def save_voxels(path: Path, voxels: Voxels) -> None:
     path : Path
         Ends in ``.npz``; the file is an ordinary compressed npz with fixed time stamps.
     voxels : Voxels
+        What to write.
     """
     names = sorted(voxels.energy)
     arrays = {
@@ -60,6 +61,16 @@ def save_voxels(path: Path, voxels: Voxels) -> None:
 
 def load_voxels(path: Path) -> Voxels:
     """Read voxels that :func:`save_voxels` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        The npz file.
+
+    Returns
+    -------
+    Voxels
+        With the same arrays, bit for bit.
 
     Raises
     ------

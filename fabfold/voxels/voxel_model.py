@@ -15,7 +15,7 @@ SUBDIVISION = 20
 
 @dataclass(frozen=True)
 class Voxels:
-    """What the voxel stage hands on (paper section 3).
+    """A model cut into voxels (paper section 3).
 
     Everything is in lattice units of shape A: cell ``(i, j, k)`` is the cube of side 1 about the
     point ``(i, j, k)``; subvoxel ``(a, b, c)`` of it is the cube of side 1/20 whose smallest
@@ -24,9 +24,10 @@ class Voxels:
     Attributes
     ----------
     cells : (n, 3) int32 array
-        Cells kept, sorted lexicographically, smallest coordinate 0 on every axis.
+        Lattice coordinates of the kept cells, sorted lexicographically, smallest coordinate 0 on
+        every axis.
     subvoxels : (n, 20, 20, 20) bool array
-        Material in each cell after the warp.
+        Which subvoxels of each cell are material, after the warp.
     fill : (n,) float64 array
         Share of each cell that is material (mean of `subvoxels`).
     vertices : (v, 3) float64 array

@@ -12,14 +12,13 @@ from fabfold.lattice.template import Template
 from fabfold.progress import Progress, SilentProgress
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.regions import Region
-from fabfold.voxels.cut import cut_voxels
 from fabfold.voxels.grid_placement import grid_rotations
 from fabfold.voxels.offsets import CellEnergy
-from fabfold.voxels.refinement import PITCHES, Ranked, Refinement, Tried
-from fabfold.voxels.region_cells import spread
+from fabfold.voxels.refinement import PITCHES, RankedGrid, RefinedGrid, Refinement
+from fabfold.voxels.region_cells import region_cut_cost
 from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 
-__all__ = ["MAX_LOSS", "shares_of", "voxelize"]
+__all__ = ["MAX_LOSS", "fill_shares", "voxelize"]
 
 #: A voxelization that loses more than this share of the model's volume is no solution.
 MAX_LOSS = 0.10
@@ -67,7 +66,9 @@ def voxelize(
     Parameters
     ----------
     solid : Solid
+        The model.
     template : Template
+        The target shape, which limits the number of cells of each checkerboard colour.
     seed : int
         Of the random rotations.
     rotation : (3, 3) array, optional
@@ -90,8 +91,9 @@ def voxelize(
     max_loss : float
         Largest share of the model's volume that may be lost in dropped cells.
     regions : sequence of Region
-        That shall lie in few cells; each cell more costs as much as a sliver.
+        Parts of the model that shall lie in few cells; each cell more costs as much as a sliver.
     progress : Progress, optional
+        Hears of the stages of the search.
 
     Returns
     -------
@@ -99,7 +101,7 @@ def voxelize(
         Different ones, best first: most total fill, less 0.5 a sliver, less lost material. The
         counts of both checkerboard colours fit the template, and the voxels hang together through
         printed contacts. Of four, three leave a part of the template free, each more than the one
-        before, see :func:`shares_of`; not where `pitch` or `origin` is given.
+        before, see :func:`fill_shares`; not where `pitch` or `origin` is given.
 
     Raises
     ------
@@ -123,71 +125,85 @@ def voxelize(
     else:
         nearby = int(_NEARBY * placements)
         rotations = grid_rotations(placements - nearby, seed, np.asarray(solid.vertices))
-    rounds = Refinement(solid, template, rotations, CellEnergy(drop_below=drop_below), max_offset)
-    if not rounds.volume > 0:
+    refinement = Refinement(
+        solid, template, rotations, CellEnergy(drop_below=drop_below), max_offset
+    )
+    if not refinement.volume > 0:
         raise NoVoxelsError("the model encloses no volume; repair it first")
-    _refuse_thin(rounds, pitch)
+    _refuse_thin(refinement, pitch)
 
     free = pitch is None and centre is None
-    pitches = np.array([pitch]) if pitch is not None else _pitches(rounds, max_loss, centre)
+    pitches = np.array([pitch]) if pitch is not None else _pitches(refinement, max_loss, centre)
     if centre is None:
-        ranked = rounds.first(pitches, nearby, seed, progress)
+        ranked = refinement.rank(pitches, nearby, seed, progress)
     else:
         x, y, z = centre.tolist()
-        ranked = [Ranked(0.0, 0, float(value), (x, y, z)) for value in pitches]
-    shares = shares_of(len(template))[:results] if free else (1.0,)
-    chosen: list[Tried] = []
+        ranked = [RankedGrid(0.0, 0, float(value), (x, y, z)) for value in pitches]
+    shares = fill_shares(len(template))[:results] if free else (1.0,)
+    chosen: list[RefinedGrid] = []
     done: list[tuple[float, Voxels]] = []
     for place, share in enumerate(shares):
         count = len(range(place, results, len(shares)))
-        here, some = rounds, ranked if centre is not None else ranked[:shortlist]
+        here, some = refinement, ranked if centre is not None else ranked[:shortlist]
         if place > 0:
-            here = rounds.with_share(share)
-            some = here.again(ranked, pitches * share ** (-1 / 3))[: max(1, shortlist // _FEWER)]
-        found = _tried(here, some, free, centre is not None, regions)
+            here = refinement.with_share(share)
+            some = here.rank_again(ranked, pitches * share ** (-1 / 3))
+            some = some[: max(1, shortlist // _FEWER)]
+        found = _refined_grids(here, some, free, centre is not None, regions)
         done += _finish(here, found, chosen, count, max_loss, regions)
         if place == 0:
             full = found
         progress.update(0.4 + 0.6 * (place + 1) / len(shares), f"{len(done)} voxelizations")
     if not done:
-        raise NoVoxelsError(_nearest(rounds, full, max_loss))
+        raise NoVoxelsError(_nearest(refinement, full, max_loss))
     return [voxels for _, voxels in sorted(done, key=lambda pair: pair[0])]
 
 
-def shares_of(cells: int) -> tuple[float, ...]:
-    """Shares of a template's cells, largest first, that voxelizations shall fill."""
+def fill_shares(cells: int) -> tuple[float, ...]:
+    """Shares of a template's cells that voxelizations shall fill.
+
+    Parameters
+    ----------
+    cells : int
+        Number of cells of the template.
+
+    Returns
+    -------
+    tuple of float
+        Descending from 1, in equal steps; only 1 for a small template.
+    """
     if cells < _LEAST:
         return (1.0,)
     least = max(0.5, 1.0 - _FREE * cells ** (1 / 3))
     return tuple(float(share) for share in np.linspace(1.0, least, _SIZES))
 
 
-def _tried(
-    rounds: Refinement,
-    ranked: Sequence[Ranked],
+def _refined_grids(
+    refinement: Refinement,
+    ranked: Sequence[RankedGrid],
     free: bool,
     hold_origin: bool,
     regions: Sequence[Region],
-) -> list[Tried]:
+) -> list[RefinedGrid]:
     """Grids near those ranked best, with their planes moved, best first."""
     units = PITCHES if free else (SUBDIVISION,)
-    found: list[Tried] = []
+    found: list[RefinedGrid] = []
     for item in ranked:
-        found.extend(rounds.second(item, units, hold_origin))
-    found.sort(key=lambda tried: tried.order)
+        found.extend(refinement.refine(item, units, hold_origin))
+    found.sort(key=lambda grid: grid.sort_key)
     if free:
         for step in _LARGER:
-            if found and found[0].verdict.excess == 0:
+            if found and found[0].fit.excess == 0:
                 break
             for item in ranked[:_REFINED]:
-                found.extend(rounds.second(item, step, False))
-            found.sort(key=lambda tried: tried.order)
-        for tried in _different(found)[:_REFINED]:
-            found.extend(rounds.third(tried))
-        found.sort(key=lambda tried: tried.order)
+                found.extend(refinement.refine(item, step, False))
+            found.sort(key=lambda grid: grid.sort_key)
+        for grid in _different(found)[:_REFINED]:
+            found.extend(refinement.refine_pitch(grid))
+        found.sort(key=lambda grid: grid.sort_key)
     if regions:
-        price = {id(tried): spread(regions, tried.placement) for tried in found}
-        found.sort(key=lambda tried: (tried.order[0], tried.order[1] + price[id(tried)]))
+        price = {id(grid): region_cut_cost(regions, grid.placement) for grid in found}
+        found.sort(key=lambda grid: (grid.sort_key[0], grid.sort_key[1] + price[id(grid)]))
     return found
 
 
@@ -232,10 +248,10 @@ def _checked_origin(origin: ArrayLike) -> NDArray[np.float64]:
     return point
 
 
-def _refuse_thin(rounds: Refinement, pitch: float | None) -> None:
+def _refuse_thin(refinement: Refinement, pitch: float | None) -> None:
     """End at once where all material together cannot fill one voxel."""
-    low = rounds.pitch_range()[0] if pitch is None else pitch
-    filled = rounds.volume / low**3
+    low = refinement.pitch_range()[0] if pitch is None else pitch
+    filled = refinement.volume / low**3
     if filled < 1.0:
         raise NoVoxelsError(
             f"with voxels of {low:.4g} model units"
@@ -243,61 +259,61 @@ def _refuse_thin(rounds: Refinement, pitch: float | None) -> None:
             + f", all of the model together fills {filled:.2g} of one voxel: "
             + ("the model is too thin to be folded; thicken it" if pitch is None else "lower pitch")
         )
-    if rounds.extent / low > rounds.capacity.cells + 2:
+    if refinement.extent / low > refinement.capacity.cells + 2:
         raise NoVoxelsError(
-            f"with voxels of {low:.4g} model units the model is {rounds.extent / low:.0f} voxels "
-            f"long, and template {rounds.template.name} has only {rounds.capacity.cells}: "
-            "raise pitch, or use a larger template"
+            f"with voxels of {low:.4g} model units the model is {refinement.extent / low:.0f} "
+            f"voxels long, and template {refinement.template.name} has only "
+            f"{refinement.capacity.cells}: raise pitch, or use a larger template"
         )
 
 
 def _pitches(
-    rounds: Refinement, max_loss: float, centre: NDArray[np.float64] | None
+    refinement: Refinement, max_loss: float, centre: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
     """Pitches worth trying, from a quick look at a few rotations."""
-    pilot, nearest = rounds.pilot(max_loss)
+    pilot, nearest = refinement.pilot(max_loss)
     if pilot is None:
-        low, high = rounds.pitch_range()
+        low, high = refinement.pitch_range()
         raise NoVoxelsError(
             f"no voxel size from {low:.4g} to {high:.4g} model units suits template "
-            f"{rounds.template.name} ({rounds.capacity.cells} cells): the best of a first look is "
-            f"{nearest}. The model is too thin for this template: thicken it, lower drop_below, "
-            "or use a larger template"
+            f"{refinement.template.name} ({refinement.capacity.cells} cells): the best of a first "
+            f"look is {nearest}. The model is too thin for this template: thicken it, lower "
+            "drop_below, or use a larger template"
         )
     if centre is None:
         return np.asarray(pilot * 1.03 ** np.arange(-5, 3))
     return np.asarray(pilot * 1.01 ** np.arange(-18, 13))
 
 
-def _different(found: list[Tried]) -> list[Tried]:
-    """Those that fit, one for each rotation."""
+def _different(found: list[RefinedGrid]) -> list[RefinedGrid]:
+    """The best grid that fits of each rotation."""
     seen: set[int] = set()
     best = []
-    for tried in found:
-        if tried.verdict.excess == 0 and tried.rotation not in seen:
-            seen.add(tried.rotation)
-            best.append(tried)
+    for grid in found:
+        if grid.fit.excess == 0 and grid.rotation not in seen:
+            seen.add(grid.rotation)
+            best.append(grid)
     return best
 
 
 def _shortlist(
-    rounds: Refinement, found: Sequence[Tried], before: Sequence[Tried], count: int
-) -> list[Tried]:
-    """Up to `count` that fit, best first, different from each other and from those `before`."""
-    chosen: list[Tried] = []
+    refinement: Refinement, found: Sequence[RefinedGrid], before: Sequence[RefinedGrid], count: int
+) -> list[RefinedGrid]:
+    """Up to `count` grids that fit, best first, unlike each other and unlike those `before`."""
+    chosen: list[RefinedGrid] = []
     used: dict[int, int] = {}
-    for tried in found:
-        fills = tried.verdict.fills
-        family = rounds.family[tried.rotation]
-        if tried.verdict.excess > 0 or used.get(family, 0) == 2:
+    for grid in found:
+        fills = grid.fit.fills
+        family = refinement.family[grid.rotation]
+        if grid.fit.excess > 0 or used.get(family, 0) == 2:
             continue
         if any(
-            len(fills) == len(other.verdict.fills)
-            and np.abs(fills - other.verdict.fills).mean() < _SAME_FILL
+            len(fills) == len(other.fit.fills)
+            and np.abs(fills - other.fit.fills).mean() < _SAME_FILL
             for other in [*before, *chosen]
         ):
             continue
-        chosen.append(tried)
+        chosen.append(grid)
         used[family] = used.get(family, 0) + 1
         if len(chosen) == count:
             break
@@ -305,40 +321,36 @@ def _shortlist(
 
 
 def _finish(
-    rounds: Refinement,
-    found: Sequence[Tried],
-    chosen: list[Tried],
+    refinement: Refinement,
+    found: Sequence[RefinedGrid],
+    chosen: list[RefinedGrid],
     count: int,
     max_loss: float,
     regions: Sequence[Region],
 ) -> list[tuple[float, Voxels]]:
-    """Cut the best placements and check them: price, the lower the better, and voxels.
+    """Cut the best grids and check the voxels: price, the lower the better, and voxels.
 
-    What is taken is added to `chosen`; what is like an earlier one is passed over.
+    Grids that are taken are added to `chosen`; a grid like an earlier one is passed over.
     """
     done: list[tuple[float, Voxels]] = []
     # Sampling the warped model can still cost a cell its place, so some more than are wanted.
-    for tried in _shortlist(rounds, found, chosen, _TRIES) or found[:_TRIES]:
-        voxels, _, _ = cut_voxels(
-            rounds.vertices, rounds.faces, tried.placement, rounds.energy, rounds.capacity
-        )
+    for grid in _shortlist(refinement, found, chosen, _TRIES) or found[:_TRIES]:
+        voxels, _, _ = refinement.cut(grid)
         if voxels is None or voxels.lost_volume > max_loss:
             continue
-        price = spread(regions, tried.placement) - voxels.energy["score"]
+        price = region_cut_cost(regions, grid.placement) - voxels.energy["score"]
         done.append((price, voxels))
-        chosen.append(tried)
+        chosen.append(grid)
         if len(done) == count:
             break
     return done
 
 
-def _nearest(rounds: Refinement, found: Sequence[Tried], max_loss: float) -> str:
+def _nearest(refinement: Refinement, found: Sequence[RefinedGrid], max_loss: float) -> str:
     """Why none of the placements will do."""
     nearest = "no cell with enough material"
-    for tried in found[:1]:
-        voxels, kept, excess = cut_voxels(
-            rounds.vertices, rounds.faces, tried.placement, rounds.energy, rounds.capacity
-        )
+    for grid in found[:1]:
+        voxels, kept, excess = refinement.cut(grid)
         if voxels is None:
             nearest = f"{kept} cells, {excess} of them too many" if kept else nearest
         else:
@@ -346,9 +358,9 @@ def _nearest(rounds: Refinement, found: Sequence[Tried], max_loss: float) -> str
                 f"{kept} cells, with {100 * voxels.lost_volume:.0f} % of the volume lost "
                 f"(allowed: {100 * max_loss:.0f} %)"
             )
-    even, odd = rounds.capacity.colours
+    even, odd = refinement.capacity.colours
     return (
-        f"no placement of the grid fits template {rounds.template.name} ({even} + {odd} cells "
+        f"no placement of the grid fits template {refinement.template.name} ({even} + {odd} cells "
         f"by checkerboard colour); the best has {nearest}. "
         "Try a larger pitch or template, another seed, more placements, or a thicker model"
     )

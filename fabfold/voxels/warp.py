@@ -27,17 +27,21 @@ def split_at_plane(
     Parameters
     ----------
     vertices : (v, 3) float64 array
+        Corner coordinates, in any unit.
     faces : (f, 3) int32 array
+        Three vertex indices for each triangle.
     axis : int
-        0, 1 or 2.
+        0, 1 or 2: the axis that the plane is perpendicular to.
     position : float
+        Where the plane crosses this axis, in the unit of `vertices`.
 
     Returns
     -------
     vertices : (v + w, 3) float64 array
         The old ones, then one on each edge that crossed; those lie exactly on the plane.
     faces : (g, 3) int32 array
-        None of them has corners on both sides. Orientation and closedness are kept.
+        Triangles, none with corners on both sides of the plane. Orientation and closedness are
+        kept.
     """
     side = np.sign(vertices[:, axis] - position).astype(np.int8)
     corner_side = side[faces]
@@ -94,18 +98,18 @@ def warp_mesh(
     Parameters
     ----------
     vertices : (v, 3) float64 array
-        Inside the outermost planes.
+        Corner coordinates inside the outermost planes, lattice units.
     faces : (f, 3) int32 array
-        A closed two-manifold.
+        Triangles of a closed two-manifold.
     planes, targets : three float64 arrays each
-        Ascending positions of the planes of x, y and z now and after the warp.
+        Ascending positions of the planes of x, y and z before and after the warp, lattice units.
 
     Returns
     -------
     vertices : (w, 3) float64 array
-        Vertices on a plane are exactly on its target.
+        Lattice units; vertices on a plane are exactly on its target.
     faces : (g, 3) int32 array
-        Closed, two-manifold, oriented as before.
+        Triangles: closed, two-manifold, oriented as before.
     """
     reach = 1e-9 * float(np.ptp(vertices, axis=0).max())
     vertices = vertices.copy()

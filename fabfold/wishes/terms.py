@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from fabfold.errors import NoSolutionError, NoTreeError
 from fabfold.lattice.rotations import FACES, ROTATIONS
 from fabfold.lattice.template import Template
-from fabfold.solid.regions import Area, Region
+from fabfold.solid.regions import Region, SurfaceSamples
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.problem import TreeProblem
 from fabfold.voxels.features import Features
-from fabfold.voxels.region_cells import owners
+from fabfold.voxels.region_cells import containing_voxels
 from fabfold.voxels.voxel_model import Voxels
 
 __all__ = [
@@ -47,13 +47,13 @@ class Keep:
     ----------
     text : str
         As it was written.
-    area : Area
+    area : SurfaceSamples
     side : int
         Side of the template, as an index of :data:`fabfold.lattice.rotations.FACES`.
     """
 
     text: str
-    area: Area
+    area: SurfaceSamples
     side: int
 
     def by_voxel(self, voxels: Voxels) -> tuple[NDArray[np.float64], float]:
@@ -63,7 +63,7 @@ class Keep:
         its cosine, so the shares of a sample add up to 1.
         """
         seen = np.maximum((self.area.outward @ voxels.rotation.T) @ FACES.T, 0.0) ** 2
-        holder = owners(voxels, self.area.points)
+        holder = containing_voxels(voxels, self.area.points)
         share = np.zeros((len(voxels), 6))
         held = holder >= 0
         unit = voxels.pitch**2
@@ -301,7 +301,7 @@ def _protected(region: Region, voxels: Voxels, tree: FoldTree) -> dict[str, Any]
     names: list[str] = []
     shares: list[float] = []
     for points in region.pieces:
-        holder = owners(voxels, points)
+        holder = containing_voxels(voxels, points)
         counts = np.bincount(body[holder[holder >= 0]], minlength=len(tree.bodies))
         if counts.any():
             names.append(tree.bodies[int(counts.argmax())].name)
@@ -362,7 +362,7 @@ def _uncut(region: Region, voxels: Voxels, features: Features, template: Templat
     joinable.add_nodes_from(range(len(voxels)))
     joinable.add_edges_from(features.pairs[features.rigid].tolist())
     for points in region.pieces:
-        holder = owners(voxels, points)
+        holder = containing_voxels(voxels, points)
         inside = np.bincount(holder[holder >= 0], minlength=len(voxels))
         if not inside.any():
             continue
