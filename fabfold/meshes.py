@@ -218,12 +218,5 @@ def mesh_volume(vertices: NDArray[np.float64], faces: NDArray[np.integer[Any]]) 
     -------
     float
         In the cube of the unit of `vertices`; negative if the mesh is inside out.
-
-    Notes
-    -----
-    The products are summed in one run. `Solid.volume` and `BodyMesh.volume` sum them triangle by
-    triangle, which may differ in the last digit. Kits hold digits of both, so both stay.
     """
-    corners = vertices[faces] - vertices.mean(axis=0)
-    normals = np.cross(corners[:, 1], corners[:, 2])
-    return float(np.einsum("ij,ij->", corners[:, 0], normals) / 6.0)
+    return float(triple_products(vertices[faces] - vertices.mean(axis=0)).sum() / 6)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.meshes import triple_products
+from fabfold.meshes import mesh_volume
 
 __all__ = ["BodyMesh", "Joinery"]
 
@@ -34,8 +34,7 @@ class BodyMesh:
     @property
     def volume(self) -> float:
         """Enclosed volume in mm³."""
-        corners = self.vertices[self.faces] - self.vertices.mean(axis=0)
-        return float(triple_products(corners).sum() / 6)
+        return mesh_volume(self.vertices, self.faces)
 
 
 @dataclass(frozen=True)

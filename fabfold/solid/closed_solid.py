@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.meshes import triple_products
+from fabfold.meshes import mesh_volume
 
 __all__ = ["Paint", "Solid"]
 
@@ -58,8 +58,7 @@ class Solid:
     @property
     def volume(self) -> float:
         """Enclosed volume in cubic model units."""
-        corners = self.vertices[self.faces] - self.vertices.mean(axis=0)
-        return float(triple_products(corners).sum() / 6)
+        return mesh_volume(self.vertices, self.faces)
 
     @property
     def bounds(self) -> NDArray[np.float64]:

@@ -21,10 +21,10 @@ __all__ = [
     "HINGE_REACH",
     "RIGID_CONTACT",
     "Features",
-    "components",
     "contact_counts",
     "face_pairs",
     "features",
+    "largest_pieces",
 ]
 
 #: Subvoxel contacts (of 400) between the main pieces of two voxels that hold them together as one
@@ -46,8 +46,6 @@ class Features:
     ----------
     pairs : (m, 2) int32 array
         Voxels ``i < j`` whose cells share a face, sorted; ``cells[j] - cells[i]`` is +x, +y or +z.
-    contact : (m,) int32 array
-        Pairs of subvoxels, material on both sides of the shared face, 0 to 400.
     rigid : (m,) bool array
         The main pieces of both voxels touch enough (`RIGID_CONTACT`) to be one printed piece.
     hinge : (m, 4) bool array
@@ -59,31 +57,17 @@ class Features:
     depth : (n, 6) float64 array
         Mean depth to the first material of rays shot into the voxel from each face, in the order of
         :data:`fabfold.lattice.rotations.FACES`; 0 is a full face, 1 an empty voxel (Eq. 8).
-    pieces : (n,) int32 array
-        Pieces of material in the cell that do not hang together within it.
-    main : (n,) float64 array
-        Share of the cell's material in its largest piece.
     """
 
     pairs: NDArray[np.int32]
-    contact: NDArray[np.int32]
     rigid: NDArray[np.bool_]
     hinge: NDArray[np.bool_]
     double: NDArray[np.bool_]
     depth: NDArray[np.float64]
-    pieces: NDArray[np.int32]
-    main: NDArray[np.float64]
-
-    @property
-    def joinable(self) -> NDArray[np.bool_]:
-        """Pairs that some joint can hold together, shape (m,)."""
-        return np.asarray(self.rigid | self.hinge.any(axis=1) | self.double)
 
 
-def components(
-    subvoxels: NDArray[np.bool_],
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
-    """Pieces of material within each cell, joined through faces of subvoxels.
+def largest_pieces(subvoxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The largest piece of material in each cell, joined through faces of subvoxels.
 
     Parameters
     ----------
@@ -92,12 +76,8 @@ def components(
 
     Returns
     -------
-    labels : (n, s, s, s) int32 array
-        0 where there is no material, else a number that is different for every piece of every cell.
-    pieces : (n,) int32 array
-        Pieces in each cell.
-    main : (n, s, s, s) bool array
-        The largest piece of each cell (the first of several equal ones).
+    (n, s, s, s) bool array
+        Subvoxels of the largest piece of each cell (of the first of several equal ones).
     """
     from scipy import ndimage
 
@@ -109,13 +89,11 @@ def components(
     owner = np.zeros(count + 1, dtype=np.int64)
     where = np.nonzero(labels)
     owner[labels[where]] = where[0]
-    pieces = np.bincount(owner[1:], minlength=len(subvoxels)).astype(np.int32)
     best = np.zeros(len(subvoxels), dtype=np.int64)
     # Written from the smallest to the largest, so the largest (and of equals the first) stays.
     order = np.lexsort((-np.arange(1, count + 1), sizes[1:])) + 1
     best[owner[order]] = order
-    main = (labels == best[:, None, None, None]) & (labels > 0)
-    return labels, pieces, main
+    return np.asarray((labels == best[:, None, None, None]) & (labels > 0))
 
 
 def face_pairs(cells: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -233,17 +211,13 @@ def features(voxels: Voxels) -> Features:
     """
     if voxels.subvoxels.shape[1:] != (SUBDIVISION,) * 3:
         raise ValueError(f"subvoxels must be (n, 20, 20, 20), not {voxels.subvoxels.shape}")
-    _, pieces, main = components(voxels.subvoxels)
+    main = largest_pieces(voxels.subvoxels)
     pairs = face_pairs(voxels.cells)
     held = contact_counts(voxels.cells, pairs, main)
-    material = np.maximum(voxels.subvoxels.sum(axis=(1, 2, 3)), 1)
     return Features(
         pairs=pairs,
-        contact=contact_counts(voxels.cells, pairs, voxels.subvoxels),
         rigid=held >= RIGID_CONTACT,
         hinge=_hinge_edges(voxels.cells, pairs, main),
         double=held >= DOUBLE_CONTACT,
         depth=_ray_depth(voxels.subvoxels),
-        pieces=pieces,
-        main=main.sum(axis=(1, 2, 3)) / material,
     )
