@@ -12,7 +12,7 @@ import trimesh
 from fabfold.errors import ModelError
 from fabfold.lattice.shipped import load_template
 from fabfold.meshes import is_closed
-from fabfold.samples.catalogue import build_sample, load_model, sample, sample_names, solid_of
+from fabfold.samples.catalogue import build_sample, load_model, mesh_sample, sample, sample_names
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.convert import to_manifold
 from fabfold.solid.scan import scan_mesh
@@ -25,7 +25,7 @@ def drawn(name: str) -> Any:
 
 @functools.cache
 def loaded(name: str) -> Solid:
-    return solid_of(drawn(name), sample(name))
+    return mesh_sample(drawn(name), sample(name))
 
 
 def test_names() -> None:

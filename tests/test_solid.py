@@ -514,6 +514,7 @@ def test_precision_lost_far_from_the_origin(tmp_path: Path) -> None:
         ("index.off", b"OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n", "line 5"),
         ("head.off", b"OOPS\n", "starts with OFF"),
         ("count.off", b"OFF\nmany\n", "line 2"),
+        ("power.off", "OFF\n3² 1 0\n".encode(), "line 2"),
         ("points.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
          b"property float y\nproperty float z\nend_header\n0 0 0\n", "no triangles"),
         ("early.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n"

@@ -26,9 +26,9 @@ __all__ = [
     "build_sample",
     "load_model",
     "load_sample",
+    "mesh_sample",
     "sample",
     "sample_names",
-    "solid_of",
 ]
 
 #: What the name of a sample begins with where a model file could stand.
@@ -151,7 +151,7 @@ def load_sample(name: str) -> Solid:
     ModelError
         If there is no such sample.
     """
-    return solid_of(build_sample(name), sample(name))
+    return mesh_sample(build_sample(name), sample(name))
 
 
 def load_model(source: str | Path) -> Solid:
@@ -180,7 +180,7 @@ def load_model(source: str | Path) -> Solid:
     return load_solid(source)
 
 
-def solid_of(part: build123d.Part, known: Sample) -> Solid:
+def mesh_sample(part: build123d.Part, known: Sample) -> Solid:
     """Mesh of a drawn sample.
 
     Parameters

@@ -129,7 +129,7 @@ def read_off(path: Path) -> RawMesh:
     if not words:
         number, line = next(lines, (number, ""))
         words = line.split()
-    counts = [int(word) for word in words[:2] if word.isdigit()]
+    counts = [int(word) for word in words[:2] if word.isdecimal()]
     if len(counts) != 2:
         raise ModelError(
             f"{path.name}, line {number}: expected the numbers of vertices and faces; {_AGAIN}"

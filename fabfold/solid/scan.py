@@ -107,7 +107,20 @@ def _summed(steps):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def box_counts_kernel(table, xs, ys, zs):  # type: ignore[no-untyped-def]
-    """Compiled part of :func:`box_counts`, for other compiled functions; `planes` one by one."""
+    """The compiled part of :func:`box_counts`, which other compiled functions can call.
+
+    Parameters
+    ----------
+    table : int32 array
+        From :func:`summed_volume`.
+    xs, ys, zs : int64 arrays
+        Ascending plane positions in subvoxels.
+
+    Returns
+    -------
+    (len(xs) - 1, len(ys) - 1, len(zs) - 1) int32 array
+        Numbers of subvoxels.
+    """
     counts = np.zeros((len(xs) - 1, len(ys) - 1, len(zs) - 1), dtype=np.int32)
     nx, ny, nz = table.shape[0] - 1, table.shape[1] - 1, table.shape[2] - 1
     for i in range(len(xs) - 1):
