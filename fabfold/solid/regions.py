@@ -296,7 +296,7 @@ class SurfaceSamples:
 
 def _material(solid: Solid, low: Points, step: float, size: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which cubes of side `step` from the corner `low` on have their centre in the model."""
-    # Imported here: numba takes a second, and whoever only reads a recipe needs none of it.
+    # Imported here: numba is slow to import, and reading a recipe does not need it.
     from fabfold.solid.scan import scan_mesh
 
     x, y, z = size.tolist()
