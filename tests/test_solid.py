@@ -521,6 +521,7 @@ def test_precision_lost_far_from_the_origin(tmp_path: Path) -> None:
          b"property float x\nproperty float y\nproperty float z\nelement face 4\n"
          b"property list uchar int vertex_indices\nend_header\n\x00\x00", "ends early"),
         ("odd.ply", b"ply\nhello\n", "line 2"),
+        ("property.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty\n", "line 4"),
         ("endless.ply", b"ply\nformat ascii 1.0\n", "PLY header"),
         ("text.ply", b"once upon a time", "plain text"),
         ("text.glb", b"once upon a time", "plain text"),

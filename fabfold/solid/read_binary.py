@@ -77,7 +77,7 @@ def _check_ply(path: Path) -> tuple[dict[str, int], bool]:
             elif words[:1] == ["element"] and len(words) == 3 and words[2].isdigit():
                 element = words[1]
                 counts[element], widths[element] = int(words[2]), 0
-            elif words[:1] == ["property"] and element:
+            elif words[:1] == ["property"] and element and len(words) > 2:
                 # A list takes at least its own count.
                 kind = words[2] if len(words) > 4 and words[1] == "list" else words[1]
                 widths[element] += _PLY_BYTES.get(kind, 1)
