@@ -85,6 +85,7 @@ def test_a_stage_done_is_read_not_made_again(bar_kit):
     assert again.solid().notes == bar_kit.solid().notes
 
 
+@pytest.mark.slow
 def test_the_recipe_makes_the_same_bytes_with_another_number_of_workers(bar_kit, tmp_path):
     other = open_kit(str(bar_kit.folder / "kit.toml"), folder=tmp_path / "other", workers=2)
     other.export()
@@ -119,9 +120,10 @@ def test_without_a_folder_nothing_is_written(bar, bar_options, tmp_path, monkeyp
         kit.export()
 
 
+@pytest.mark.slow
 def test_interrupt_leaves_what_is_done_and_goes_on(bar, bar_options, tmp_path):
     folder = tmp_path / "kit"
-    command = [sys.executable, "-m", "fabfold", "export", str(bar), "-o", str(folder)]
+    command = [sys.executable, "-m", "fabfold", "fold", str(bar), "-o", str(folder)]
     for key, value in bar_options.items():
         command += [f"--{key}", str(value)]
     run = subprocess.Popen(command, stderr=subprocess.PIPE, encoding="utf-8")
@@ -140,7 +142,7 @@ def test_interrupt_leaves_what_is_done_and_goes_on(bar, bar_options, tmp_path):
     again = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
     assert again.returncode == 0, again.stderr
     assert "Cutting voxels" not in again.stderr
-    assert (folder / "report.json").is_file()
+    assert (folder / "motion.json").is_file()
 
 
 def test_the_voxels_may_not_outnumber_the_template(bar):
