@@ -1,12 +1,12 @@
 import pytest
 import trimesh
-from hinges.tolerance_coupon import DEFAULT_CLEARANCES
 from typer.testing import CliRunner
 
 from fabfold.cli.app import app
 from fabfold.errors import RecipeError
 from fabfold.printing.calibrate import calibrate, write_profile
 from fabfold.printing.profiles import load_profile
+from hinges.tolerance_coupon import DEFAULT_CLEARANCES
 
 
 def test_a_calibrated_profile_survives_its_file(tmp_path):

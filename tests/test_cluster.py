@@ -20,8 +20,6 @@ from fabfold.search.run import executor, run_seeds, search
 from fabfold.search.seeds import Job
 from fabfold.tree.effort import EFFORTS
 
-pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
-
 EFFORT = replace(EFFORTS["quick"], restarts=2, polish_best=20)
 #: Bounds hangs only.
 LONG = 180.0

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,24 +19,6 @@ from fabfold.tree.fold_tree import FoldTree
 
 #: A shell's background job ignores SIGINT, and so do its children; both signals stop a run alike.
 HEARS_CTRL_C = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
-OPTIONS = {"template": "box-2x2x2", "effort": "quick", "seed": 3}
-
-
-@pytest.fixture(scope="module")
-def bar(tmp_path_factory):
-    """A chunky bar that is eight voxels long."""
-    path = tmp_path_factory.mktemp("model") / "bar.stl"
-    mesh = trimesh.creation.box((80.0, 9.6, 9.6))
-    mesh.export(path)
-    return path
-
-
-@pytest.fixture(scope="module")
-def kit(bar, tmp_path_factory):
-    """The bar's kit, exported."""
-    kit = Kit.from_model(bar, folder=tmp_path_factory.mktemp("kit") / "bar-kit", **OPTIONS)
-    kit.export()
-    return kit
 
 
 def files_of(folder):
@@ -46,26 +29,30 @@ def files_of(folder):
     }
 
 
-def test_a_kit_has_every_file(kit):
-    names = {str(path.relative_to(kit.folder)) for path in kit.folder.rglob("*")}
+def read_json(kit, name):
+    return json.loads((kit.folder / name).read_text(encoding="utf-8"))
+
+
+def test_a_kit_has_every_file(bar_kit):
+    names = {str(path.relative_to(bar_kit.folder)) for path in bar_kit.folder.rglob("*")}
     wanted = {"kit.toml", "tree.json", "motion.json", "bar.3mf", "bar.step", "fold.glb"}
     assert wanted | {"report.json", "bodies/body-00.stl"} <= names
     assert not [name for name in names if ".part-" in name]
 
 
-def test_the_bar_folds_into_the_box(kit):
-    tree = FoldTree.from_json(json.loads((kit.folder / "tree.json").read_text(encoding="utf-8")))
-    motion = Motion.from_json(json.loads((kit.folder / "motion.json").read_text(encoding="utf-8")))
+def test_the_bar_folds_into_the_box(bar_kit):
+    tree = FoldTree.from_json(read_json(bar_kit, "tree.json"))
+    motion = Motion.from_json(read_json(bar_kit, "motion.json"))
     assert len(tree.source) == 8
     assert {tuple(cell) for cell in tree.target} == {tuple(c) for c in tree.template.cells}
     np.testing.assert_array_equal(motion.angles_deg[-1], tree.fold_angles)
-    assert motion.certificate["min_gap_mm"] >= kit.profile().min_gap_mm
+    assert motion.certificate["min_gap_mm"] >= bar_kit.profile().min_gap_mm
     assert len(motion.certificate["moves"]) == len(motion.moves) - 1
 
 
-def test_bodies_are_single_closed_pieces_as_many_as_in_the_tree(kit):
-    tree = kit.join().attempt.tree
-    paths = sorted((kit.folder / "bodies").glob("*.stl"))
+def test_bodies_are_single_closed_pieces_as_many_as_in_the_tree(bar_kit):
+    tree = bar_kit.join().attempt.tree
+    paths = sorted((bar_kit.folder / "bodies").glob("*.stl"))
     assert [path.stem for path in paths] == sorted(body.name for body in tree.bodies)
     for path in paths:
         mesh = trimesh.load_mesh(path)
@@ -73,41 +60,43 @@ def test_bodies_are_single_closed_pieces_as_many_as_in_the_tree(kit):
         assert mesh.body_count == 1
 
 
-def test_every_check_passes_and_is_reported_with_its_figure(kit):
-    report = json.loads((kit.folder / "report.json").read_text(encoding="utf-8"))
+def test_every_check_passes_and_is_reported_with_its_figure(bar_kit):
+    report = read_json(bar_kit, "report.json")
     assert report["format"] == "fabfold-report"
-    assert {check.name for check in kit.check()} == {c["name"] for c in report["checks"]}
-    assert all(check.ok for check in kit.check()), [c for c in kit.check() if not c.ok]
+    assert {check.name for check in bar_kit.check()} == {c["name"] for c in report["checks"]}
+    assert all(check.ok for check in bar_kit.check()), [c for c in bar_kit.check() if not c.ok]
 
 
-def test_a_stage_done_is_read_not_made_again(kit):
+def test_a_stage_done_is_read_not_made_again(bar_kit):
     class Refuse:
         def stage(self, name):
             raise AssertionError(f"stage {name} is made again")
 
-    again = open_kit(str(kit.folder))
+    again = open_kit(str(bar_kit.folder))
     again.listener = Refuse()
-    assert again.recipe == kit.recipe
-    made, old = again.join(), kit.join()
+    assert again.recipe == bar_kit.recipe
+    made, old = again.join(), bar_kit.join()
     assert made.attempt.tree.to_json(20.0, (0, 0, 0)) == old.attempt.tree.to_json(20.0, (0, 0, 0))
     assert made.joinery.notes == old.joinery.notes
     for one, other in zip(made.joinery.bodies, old.joinery.bodies, strict=True):
         np.testing.assert_array_equal(one.vertices, other.vertices)
         np.testing.assert_array_equal(one.faces, other.faces)
-    assert again.check() == kit.check()
-    assert again.solid().notes == kit.solid().notes
+    assert again.check() == bar_kit.check()
+    assert again.solid().notes == bar_kit.solid().notes
 
 
-def test_the_recipe_makes_the_same_bytes_with_another_number_of_workers(kit, tmp_path):
-    other = open_kit(str(kit.folder / "kit.toml"), folder=tmp_path / "other", workers=1)
+@pytest.mark.slow
+def test_the_recipe_makes_the_same_bytes_with_another_number_of_workers(bar_kit, tmp_path):
+    other = open_kit(str(bar_kit.folder / "kit.toml"), folder=tmp_path / "other", workers=2)
     other.export()
-    first, second = files_of(kit.folder), files_of(tmp_path / "other")
+    first, second = files_of(bar_kit.folder), files_of(tmp_path / "other")
     assert sorted(first) == sorted(second)
     assert [name for name in first if first[name] != second[name]] == []
 
 
-def test_a_changed_recipe_makes_only_what_depends_on_it(kit):
-    kit_again = open_kit(str(kit.folder), voxel_mm=30.0)
+def test_a_changed_recipe_makes_only_what_depends_on_it(bar_kit, tmp_path):
+    shutil.copytree(bar_kit.folder, tmp_path / "kit")
+    kit_again = open_kit(str(tmp_path / "kit"), voxel_mm=30.0)
     made = []
 
     class Listen:
@@ -121,9 +110,9 @@ def test_a_changed_recipe_makes_only_what_depends_on_it(kit):
     assert made == ["join"]
 
 
-def test_without_a_folder_nothing_is_written(bar, tmp_path, monkeypatch):
+def test_without_a_folder_nothing_is_written(bar, bar_options, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    kit = Kit.from_model(bar, **OPTIONS)
+    kit = Kit.from_model(bar, **bar_options)
     voxels = kit.voxelize()[0]
     assert len(voxels) == 8
     assert list(tmp_path.iterdir()) == []
@@ -131,10 +120,11 @@ def test_without_a_folder_nothing_is_written(bar, tmp_path, monkeypatch):
         kit.export()
 
 
-def test_interrupt_leaves_what_is_done_and_goes_on(bar, tmp_path):
+@pytest.mark.slow
+def test_interrupt_leaves_what_is_done_and_goes_on(bar, bar_options, tmp_path):
     folder = tmp_path / "kit"
-    command = [sys.executable, "-m", "fabfold", "export", str(bar), "-o", str(folder)]
-    for key, value in OPTIONS.items():
+    command = [sys.executable, "-m", "fabfold", "fold", str(bar), "-o", str(folder)]
+    for key, value in bar_options.items():
         command += [f"--{key}", str(value)]
     run = subprocess.Popen(command, stderr=subprocess.PIPE, encoding="utf-8")
     journal = folder / "stages" / "journal.json"
@@ -152,7 +142,7 @@ def test_interrupt_leaves_what_is_done_and_goes_on(bar, tmp_path):
     again = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
     assert again.returncode == 0, again.stderr
     assert "Cutting voxels" not in again.stderr
-    assert (folder / "report.json").is_file()
+    assert (folder / "motion.json").is_file()
 
 
 def test_the_voxels_may_not_outnumber_the_template(bar):
@@ -170,9 +160,9 @@ def test_grid_placement_by_hand(bar):
     assert voxels.pitch == 10.0
 
 
-def test_a_recipe_without_its_model_says_where_to_put_it(kit, tmp_path):
+def test_a_recipe_without_its_model_says_where_to_put_it(bar_kit, tmp_path):
     recipe = tmp_path / "kit.toml"
-    recipe.write_text((kit.folder / "kit.toml").read_text(encoding="utf-8"))
+    recipe.write_text((bar_kit.folder / "kit.toml").read_text(encoding="utf-8"))
     with pytest.raises(ModelError, match=r"bar\.stl"):
         open_kit(str(recipe), folder=tmp_path / "new")
 

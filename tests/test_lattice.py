@@ -1,5 +1,8 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from fabfold.errors import TemplateError
 from fabfold.lattice.rotations import (
@@ -15,12 +18,23 @@ from fabfold.lattice.rotations import (
 from fabfold.lattice.shipped import load_template, template_names
 from fabfold.lattice.template import Template
 
+#: The same examples every time, few, and no clock.
+same = settings(derandomize=True, deadline=None, database=None, max_examples=40)
+cells = st.lists(st.tuples(*[st.integers(-5, 5)] * 3), min_size=1, max_size=40).map(
+    lambda found: np.array(found, dtype=np.int32)
+)
+points = arrays(float, 3, elements=st.floats(-100, 100))
+directions = points.filter(lambda direction: np.linalg.norm(direction) > 0.1)
+angles = st.floats(-720, 720)
+
 
 def test_rotations_are_the_rotation_group_of_the_cube():
     assert len({r.tobytes() for r in ROTATIONS}) == 24
     assert (np.rint(np.linalg.det(ROTATIONS)) == 1).all()
     assert (ROTATIONS[0] == np.eye(3)).all()
+    assert (ROTATIONS[ROTATION_PRODUCT] == ROTATIONS[:, None] @ ROTATIONS[None]).all()
     for a in range(24):
+        assert rotation_index(ROTATIONS[a]) == a
         assert ROTATION_PRODUCT[a, ROTATION_INVERSE[a]] == 0
         assert sorted(ROTATION_PRODUCT[a]) == list(range(24))
 
@@ -49,6 +63,56 @@ def test_rotation_about_keeps_the_axis_and_turns_right_handed():
     np.testing.assert_allclose(turn @ on_axis, on_axis, atol=1e-12)
     moved = turn @ np.array([2.0, 2.0, 3.0, 1.0])
     np.testing.assert_allclose(moved[:3], [1 + np.cos(np.pi / 6), 2.5, 3.0], atol=1e-12)
+
+
+@same
+@given(points, directions, angles, angles)
+def test_turns_about_one_line_add_up(point, direction, one, other):
+    both = rotation_about(point, direction, one) @ rotation_about(point, direction, other)
+    np.testing.assert_allclose(both, rotation_about(point, direction, one + other), atol=1e-9)
+
+
+@same
+@given(points, directions, angles)
+def test_a_turn_moves_rigidly_and_back_about_the_opposite_line(point, direction, angle):
+    turn = rotation_about(point, direction, angle)
+    np.testing.assert_allclose(turn[:3, :3] @ turn[:3, :3].T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    back = rotation_about(point, -direction, angle)
+    np.testing.assert_allclose(back @ turn, np.eye(4), atol=1e-9)
+
+
+@same
+@given(cells, st.tuples(*[st.integers(-50, 50)] * 3), st.randoms(use_true_random=False))
+def test_a_template_does_not_depend_on_order_place_or_repeats(found, shift, random):
+    order = list(range(len(found)))
+    random.shuffle(order)
+    template = Template("t", found)
+    other = Template("t", np.concatenate([found[order], found[:1]]) + np.array(shift))
+    assert (template.cells == other.cells).all()
+    assert template.content == other.content
+    assert template.shape == tuple((np.ptp(found, axis=0) + 1).tolist())
+
+
+@same
+@given(cells)
+def test_cells_of_a_template_are_counted_alike_everywhere(found):
+    template = Template("t", found)
+    assert len(template) == len(np.unique(found, axis=0)) == sum(template.colours)
+    grid = template.occupancy()
+    assert grid.shape == template.shape
+    assert (np.argwhere(grid) == template.cells).all()
+
+
+@same
+@given(cells, st.integers(0, 23))
+def test_turned_cells_keep_number_colours_and_inside_edges(found, turn):
+    template = Template("t", found)
+    turned = Template("t", found @ ROTATIONS[turn].T)
+    assert len(turned) == len(template)
+    assert sorted(turned.colours) == sorted(template.colours)
+    assert sorted(turned.shape) == sorted(template.shape)
+    assert turned.inside_edges().sum() == template.inside_edges().sum()
 
 
 def test_rotation_index_refuses_what_is_no_lattice_rotation():

@@ -1,0 +1,48 @@
+"""What many tests share: one small model, and its kit, which is made once a session.
+
+Whoever changes a kit copies its folder. Imports stand inside the fixtures, since the tests of
+`hinges` also run where nothing else is installed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from fabfold.kit.kit import Kit
+
+#: Length and thickness of the bar, in its own units: eight chunky voxels in a row.
+BAR = (80.0, 9.6, 9.6)
+
+
+@pytest.fixture(scope="session")
+def bar(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Model file of a chunky bar that is eight voxels long."""
+    import trimesh
+
+    path = tmp_path_factory.mktemp("model") / "bar.stl"
+    trimesh.creation.box(BAR).export(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def bar_options() -> dict[str, Any]:
+    """Recipe of the bar's kit."""
+    return {"template": "box-2x2x2", "effort": "quick", "seed": 1}
+
+
+@pytest.fixture(scope="session")
+def bar_kit(
+    bar: Path, bar_options: dict[str, Any], tmp_path_factory: pytest.TempPathFactory
+) -> Kit:
+    """The bar's kit, exported; read only."""
+    from fabfold.kit.kit import Kit
+
+    kit = Kit.from_model(
+        bar, folder=tmp_path_factory.mktemp("kit") / "bar-kit", workers=1, **bar_options
+    )
+    kit.export()
+    return kit
