@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fabfold.tree.solve import Candidate
+    from fabfold.tree.candidate import Candidate
     from fabfold.voxels.voxel_model import Voxels
 
 

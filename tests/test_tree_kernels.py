@@ -13,9 +13,10 @@ from fabfold.tree.assembly import hinge_choice
 from fabfold.tree.initial_poses import grow
 from fabfold.tree.large_neighbourhood import ruin_and_recreate
 from fabfold.tree.pose_energy import count_defects, energy_of, label_clusters
-from fabfold.tree.problem import joint_table, tree_problem
+from fabfold.tree.problem import tree_problem
 from fabfold.tree.rng import generator, random_below, random_bits, random_float
 from fabfold.tree.swept_cells import half_turn_table, hinge_tables
+from fabfold.tree.tables import joint_table
 
 CASES = [(30, "box-3x3x4", 1), (45, "box-3x4x4", 2), (62, "box-4x4x4", 3)]
 

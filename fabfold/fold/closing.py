@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fabfold.fold.lattice_paths import free_moves
 from fabfold.lattice.creases import Parts, folded_template, line_of, parts_of, rim_of
 from fabfold.lattice.template import Template
+from fabfold.tree.candidate import Candidate
 from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
-from fabfold.tree.solve import Candidate
 from fabfold.tree.system import hinge_system
 
 __all__ = ["closed"]

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from fabfold.search.pareto import Solution
     from fabfold.search.rounds import Rounds
     from fabfold.solid.closed_solid import Solid
-    from fabfold.tree.solve import Candidate
+    from fabfold.tree.candidate import Candidate
     from fabfold.voxels.voxel_model import Voxels
     from fabfold.wishes.wish_list import Wishes
 

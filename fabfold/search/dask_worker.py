@@ -7,7 +7,7 @@ import zlib
 from typing import Any
 
 from fabfold.search.seeds import Better, Event, Job, run_seed
-from fabfold.tree.solve import Candidate
+from fabfold.tree.candidate import Candidate
 
 __all__ = ["run_payload", "stop_search", "unpacked"]
 

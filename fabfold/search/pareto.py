@@ -16,7 +16,7 @@ from fabfold.errors import NoFoldError, NoTreeError, RecipeError
 from fabfold.progress import Progress
 from fabfold.search.run import Budget, Tally, executor, run_seeds
 from fabfold.search.seeds import Event, Job, SeedResult
-from fabfold.tree.solve import Candidate
+from fabfold.tree.candidate import Candidate
 from fabfold.voxels.voxel_model import Voxels
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
 from fabfold.search.seeds import Better, Done, Event, Job, Lost, run_seed
-from fabfold.tree.solve import Candidate
+from fabfold.tree.candidate import Candidate
 
 __all__ = ["InProcessExecutor", "ProcessExecutor"]
 

@@ -27,9 +27,9 @@ from fabfold.search.run import (
 from fabfold.search.saved import SeedCache
 from fabfold.search.seeds import Event, Job, SeedResult
 from fabfold.store import StageStore, stage_key
+from fabfold.tree.candidate import Candidate
 from fabfold.tree.effort import EFFORTS
 from fabfold.tree.problem import from_features
-from fabfold.tree.solve import Candidate
 from fabfold.tree.template_parts import restrict_to_parts
 from fabfold.voxels.features import features
 from fabfold.voxels.voxel_model import Voxels

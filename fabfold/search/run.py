@@ -17,11 +17,11 @@ from fabfold.errors import NoTreeError, RecipeError, WorkerError
 from fabfold.progress import Progress, SilentProgress
 from fabfold.search.seeds import Better, Done, Event, Executor, Job, SeedResult
 from fabfold.search.warmup import warm_up_job
+from fabfold.tree.candidate import Candidate
 from fabfold.tree.catalogue import JointSet
 from fabfold.tree.effort import Effort
 from fabfold.tree.foldability import Foldability
 from fabfold.tree.problem import TreeProblem
-from fabfold.tree.solve import Candidate
 
 __all__ = [
     "Budget",

@@ -11,8 +11,8 @@ import numpy as np
 from fabfold.files import write_json
 from fabfold.search.seeds import Better, Done, Event, SeedResult
 from fabfold.store import StageStore
+from fabfold.tree.candidate import Candidate
 from fabfold.tree.fold_tree import FoldTree
-from fabfold.tree.solve import Candidate
 
 __all__ = ["SeedCache", "load_seed", "save_seed"]
 

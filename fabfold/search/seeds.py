@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from fabfold.errors import NoFoldError, NoTreeError
+from fabfold.tree.candidate import Candidate
 from fabfold.tree.effort import Effort
 from fabfold.tree.foldability import Foldability
 from fabfold.tree.problem import TreeProblem
-from fabfold.tree.solve import Candidate, solve
+from fabfold.tree.solve import solve
 
 __all__ = ["Better", "Done", "Event", "Executor", "Job", "Lost", "SeedResult", "run_seed"]
 

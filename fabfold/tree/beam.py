@@ -21,8 +21,8 @@ from fabfold.tree.cell_occupancy import (
     occupy,
 )
 from fabfold.tree.pose_energy import label_clusters
-from fabfold.tree.problem import Tables
 from fabfold.tree.rng import mix, random_float
+from fabfold.tree.tables import Tables
 
 __all__ = ["fill_beam"]
 

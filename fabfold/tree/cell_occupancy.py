@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_float
+from fabfold.tree.tables import Tables
 
 __all__ = [
     "close_taken_cells",

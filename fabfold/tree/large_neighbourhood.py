@@ -18,10 +18,10 @@ from fabfold.tree.beam import fill_beam
 from fabfold.tree.cell_occupancy import list_occupants, random_occupant
 from fabfold.tree.pose_energy import count_defects, energy_of, label_clusters
 from fabfold.tree.possible_hinges import HINGE_ROW, find_hinges, max_hinge_rows
-from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_below, random_float
 from fabfold.tree.spanning_trees import loose_pieces
 from fabfold.tree.swept_cells import HingeTables
+from fabfold.tree.tables import Tables
 
 __all__ = ["repair", "ruin", "ruin_and_recreate"]
 

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabfold.tree.cell_occupancy import counted_twice
-from fabfold.tree.problem import Tables
+from fabfold.tree.tables import Tables
 
 __all__ = [
     "count_defects",

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from fabfold.tree.cell_occupancy import mark_sharing_voxels
 from fabfold.tree.pose_energy import label_clusters
-from fabfold.tree.problem import Tables
 from fabfold.tree.swept_cells import HingeTables, double_blocked, single_blocked
+from fabfold.tree.tables import Tables
 
 __all__ = ["HINGE_ROW", "HingeRows", "find_hinges", "max_hinge_rows"]
 

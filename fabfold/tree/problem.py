@@ -6,24 +6,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import NoTreeError
 from fabfold.lattice.rotations import (
-    FACE_BEFORE,
     FACES,
-    ROTATION_PRODUCT,
     ROTATIONS,
     parity,
 )
 from fabfold.lattice.template import Template
-from fabfold.tree.catalogue import Joint, JointSet, joint_types, realizations
+from fabfold.tree.catalogue import Joint, JointSet, joint_types
 from fabfold.tree.sharing import (
     WHOLE,
     edge_octants,
@@ -32,18 +29,16 @@ from fabfold.tree.sharing import (
     quarter_depths,
     turned_masks,
 )
+from fabfold.tree.tables import Tables, cost_table, joint_table, realization_table
 
 if TYPE_CHECKING:
     from fabfold.voxels.features import Features
     from fabfold.voxels.voxel_model import Voxels
 
 __all__ = [
-    "Tables",
     "TreeProblem",
     "Weights",
-    "cost_table",
     "from_features",
-    "joint_table",
     "tree_problem",
 ]
 
@@ -68,84 +63,6 @@ class Weights:
     rigid: float = 0.0
     single: float = 0.1
     double: float = 0.12
-
-
-class Tables(NamedTuple):
-    """What the kernels read. ``n`` voxels, ``m`` template cells, ``J`` joint types.
-
-    A pose is ``24 * cell + rotation`` with ``cell`` an index into the template's cells.
-
-    Attributes
-    ----------
-    neighbour : (n, 6) int32 array
-        Voxel across each face, -1 where there is none or no joint is possible.
-    allowed : (n, 6, J) bool array
-        Whether a joint type can be made there.
-    child_pose : (6, J, 24 m) int32 array
-        Pose of the child from the face, the joint and the parent's pose; -1 outside the template.
-    joint_weight : (J,) float64 array
-        Energy of each joint type.
-    last_single : int
-        Joint types 1 to ``last_single`` are single hinges, those after them double ones.
-    realization_start : (6, J + 1) int32 array
-        Joint j of face f is made by the rows ``realization_start[f, j]`` to
-        ``realization_start[f, j + 1] - 1`` of `realization`.
-    realization : (w, 4) int32 array
-        Side and quarter turns of both axes, see :func:`fabfold.tree.catalogue.realizations`.
-    cost : (n, 24 m) float32 array
-        Weighted energy of each voxel at each pose: Eq. 8 of the faces that the box shows, and
-        `extra_cost` of :func:`tree_problem`.
-    expected_cost : (n, m) float32 array
-        Expected `cost` of each voxel in each cell. The beam subtracts it, so that states which
-        fill different cells compare.
-    always_rigid : (n, 6) bool array
-        Pairs of voxels across a face that no cut may part. No rows where there is no such pair.
-    final_edge : (a, b, c) int32 array
-        Lattice edges of the template, indexed by twice their middle plus 1: the number of the edge
-        on which a hinge there lies in the end, -1 where none may lie. The two differ where the
-        template folds once more. Of no size where every edge may be used and is final.
-    exposed : (m,) uint8 array
-        Bit ``f`` is set where the template ends at face ``f`` of a cell.
-    cell_neighbour : (m, 6) int32 array
-        Template cell across each face, -1 outside.
-    source : (n, 3) int32 array
-        Cell of each voxel in shape A.
-    cells : (m, 3) int32 array
-        Cells of the template.
-    rotations : (24, 3, 3) int32 array
-        The lattice rotations, :data:`fabfold.lattice.rotations.ROTATIONS`.
-    octant_mask : (n, 24) uint8 array
-        Octants of its cell that a voxel must have in each rotation, see
-        :mod:`fabfold.tree.sharing`; all 255 where no voxel may share.
-    max_shared : int
-        Most cells that may hold two voxels; 0 where none may.
-    quarter_depth : (n, 24, 6, 4) float32 array
-        Weighted ray depth of each quarter of each face, in each rotation; no rows where no voxel
-        may share.
-    edge_octants : (6, 6) uint8 array
-        Mask of the octants beside the edge of two faces of a cell.
-    """
-
-    neighbour: NDArray[np.int32]
-    allowed: NDArray[np.bool_]
-    child_pose: NDArray[np.int32]
-    joint_weight: NDArray[np.float64]
-    last_single: int
-    realization_start: NDArray[np.int32]
-    realization: NDArray[np.int32]
-    cost: NDArray[np.float32]
-    expected_cost: NDArray[np.float32]
-    always_rigid: NDArray[np.bool_]
-    final_edge: NDArray[np.int32]
-    exposed: NDArray[np.uint8]
-    cell_neighbour: NDArray[np.int32]
-    source: NDArray[np.int32]
-    cells: NDArray[np.int32]
-    rotations: NDArray[np.int32]
-    octant_mask: NDArray[np.uint8]
-    max_shared: int
-    quarter_depth: NDArray[np.float32]
-    edge_octants: NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -283,102 +200,6 @@ class TreeProblem:
         return fits
 
 
-def joint_table(
-    template: Template, joints: Sequence[Sequence[Joint]]
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.uint8]]:
-    """Where joints carry a child, for every pose of the parent.
-
-    Parameters
-    ----------
-    template : Template
-        The shape to fill.
-    joints : sequence of sequences of Joint
-        Joint types by index, one for each face of the parent.
-
-    Returns
-    -------
-    child_pose : (6, J, 24 m) int32 array
-        Pose of the child from the face, the joint and the parent's pose; -1 outside the template.
-    cell_neighbour : (m, 6) int32 array
-        Template cell across each face, -1 outside.
-    exposed : (m,) uint8 array
-        Bit ``f`` is set where the template ends at face ``f`` of a cell.
-    """
-    cells = template.cells
-    pad = 2
-    grid = np.full(np.array(template.shape) + 2 * pad, -1, dtype=np.int32)
-    grid[tuple((cells + pad).T)] = np.arange(len(cells), dtype=np.int32)
-    child_pose = np.full((6, len(joints), 24 * len(cells)), -1, dtype=np.int32)
-    parents = 24 * np.arange(len(cells), dtype=np.int32)
-    for index, by_face in enumerate(joints):
-        for face, joint in enumerate(by_face):
-            for rotation in range(24):
-                moved = cells + ROTATIONS[rotation] @ np.array(joint.offset, dtype=np.int32) + pad
-                landing = grid[tuple(moved.T)]
-                turned = ROTATION_PRODUCT[rotation, joint.rotation]
-                child_pose[face, index, parents + rotation] = np.where(
-                    landing >= 0, 24 * landing + turned, -1
-                )
-    cell_neighbour = np.stack([grid[tuple((cells + d + pad).T)] for d in FACES], axis=1)
-    exposed = ((cell_neighbour < 0) << np.arange(6)).sum(axis=1).astype(np.uint8)
-    return child_pose, np.ascontiguousarray(cell_neighbour), exposed
-
-
-def _realization_table(
-    joints: Sequence[Sequence[Joint]],
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    found: list[tuple[int, int, int, int]] = []
-    start = np.zeros((6, len(joints) + 1), dtype=np.int32)
-    for face in range(6):
-        for index, by_face in enumerate(joints):
-            start[face, index] = len(found)
-            found += realizations(by_face[face])
-        start[face, len(joints)] = len(found)
-    return start, np.array(found, dtype=np.int32).reshape(-1, 4)
-
-
-def cost_table(
-    depth: NDArray[np.float64],
-    exposed: NDArray[np.uint8],
-    surface_weight: float,
-    extra_cost: NDArray[np.floating] | None,
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Energy of each voxel at each pose.
-
-    Parameters
-    ----------
-    depth : (n, 6) float64 array
-        Mean ray depth into each voxel from each of its faces in A, 0 to 1 (Eq. 8).
-    exposed : (m,) uint8 array
-        Faces of each template cell that the box shows, see :class:`Tables`.
-    surface_weight : float
-        Weight of the surface's energy.
-    extra_cost : (n, 24 m) float array or None
-        Energy added for a voxel at a pose.
-
-    Returns
-    -------
-    cost : (n, 24 m) float32 array
-        As in :class:`Tables`.
-    expected_cost : (n, m) float32 array
-        As in :class:`Tables`.
-    """
-    bits = (exposed[:, None] >> np.arange(6)) & 1
-    # Face f of the cell in B is face FACE_BEFORE[r, f] of the voxel in A.
-    by_face = np.asarray(depth, dtype=float)[:, FACE_BEFORE]
-    cost = surface_weight * np.einsum("nrf,mf->nmr", by_face, bits)
-    if extra_cost is not None:
-        cost += np.asarray(extra_cost, dtype=float).reshape(cost.shape)
-    by_cell = cost.mean(axis=2)
-    cell_mean = by_cell.mean(axis=0)
-    voxel_mean = (by_cell - cell_mean).mean(axis=1)
-    expected_cost = cell_mean[None, :] + voxel_mean[:, None]
-    return (
-        np.ascontiguousarray(cost.reshape(len(cost), -1), dtype=np.float32),
-        np.ascontiguousarray(expected_cost, dtype=np.float32),
-    )
-
-
 def tree_problem(
     cells: NDArray[np.int32],
     template: Template,
@@ -452,7 +273,7 @@ def tree_problem(
         )
     rows = joint_types(joints)
     child_pose, cell_neighbour, exposed = joint_table(template, rows)
-    realization_start, realization = _realization_table(rows)
+    realization_start, realization = realization_table(rows)
     last_single = sum(by_face[0].kind == "S" for by_face in rows)
     has_plate_room = (
         np.zeros(len(pairs), dtype=bool) if double is None else np.asarray(double, dtype=bool)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from fabfold.errors import NoFoldError, NoTreeError
 from fabfold.tree.assembly import HingeChoice, SpanningTree, fold_tree, hinge_choice
+from fabfold.tree.candidate import Candidate
 from fabfold.tree.effort import Effort
-from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.foldability import Foldability, PlannerEstimate
 from fabfold.tree.initial_poses import grow
 from fabfold.tree.large_neighbourhood import ruin_and_recreate
@@ -28,31 +28,7 @@ from fabfold.tree.rng import generator
 from fabfold.tree.spanning_trees import loose_pieces
 from fabfold.tree.swept_cells import hinge_tables
 
-__all__ = ["Candidate", "Statistics", "solve"]
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A tree that folds.
-
-    Attributes
-    ----------
-    tree : FoldTree
-        The tree.
-    path : (m, 2) int32 array
-        One row a move, A to B: hinge index and signed quarter turns about its positive axis.
-    seed : int
-        Seed of the run that found it.
-    """
-
-    tree: FoldTree
-    path: NDArray[np.int32]
-    seed: int
-
-    @property
-    def energy(self) -> dict[str, float]:
-        """The tree's energies: ``surface``, ``count`` and ``total``."""
-        return self.tree.energy
+__all__ = ["Statistics", "solve"]
 
 
 @dataclass

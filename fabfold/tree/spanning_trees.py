@@ -13,9 +13,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabfold.tree.possible_hinges import HingeRows
-from fabfold.tree.problem import Tables
 from fabfold.tree.rng import random_float
 from fabfold.tree.swept_cells import HingeTables
+from fabfold.tree.tables import Tables
 
 __all__ = ["loose_pieces", "root_tree", "spanning_tree"]
 

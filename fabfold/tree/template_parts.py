@@ -19,8 +19,9 @@ from fabfold.errors import NoTreeError
 from fabfold.lattice.creases import Parts, folded_template, line_of, parts_of, rim_of
 from fabfold.lattice.rotations import FACES, ROTATION_INVERSE, ROTATION_PRODUCT, ROTATIONS, parity
 from fabfold.lattice.template import Template
-from fabfold.tree.problem import TreeProblem, cost_table
+from fabfold.tree.problem import TreeProblem
 from fabfold.tree.swept_cells import hinge_tables
+from fabfold.tree.tables import cost_table
 
 __all__ = ["restrict_to_parts"]
 
