@@ -57,12 +57,13 @@ def near_misses(voxels: Any, template: str, count: int) -> list[Any]:
     from fabfold.errors import NoFoldError, NoTreeError
     from fabfold.fold.lattice_foldability import LatticeFoldability
     from fabfold.lattice.shipped import load_template
+    from fabfold.recipe.recipe_wishes import default_weights
     from fabfold.tree.effort import Effort
     from fabfold.tree.problem import from_features
     from fabfold.tree.solve import solve
     from fabfold.voxels.features import features
 
-    problem = from_features(voxels, features(voxels), load_template(template))
+    problem = from_features(voxels, features(voxels), load_template(template), default_weights())
     judge = Recorder(LatticeFoldability(), count)
     for seed in range(20):
         with contextlib.suppress(NoFoldError, NoTreeError):

@@ -35,6 +35,7 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
     from fabfold.errors import NoFoldError, NoTreeError
     from fabfold.fold.lattice_foldability import LatticeFoldability
     from fabfold.lattice.shipped import load_template
+    from fabfold.recipe.recipe_wishes import default_weights
     from fabfold.samples.catalogue import load_model
     from fabfold.search.rounds import search_order
     from fabfold.tree.effort import Effort
@@ -58,7 +59,7 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
     for voxels in search_order(voxelize(load_model(model), target, seed=1)):
         with suppress(NoFoldError, NoTreeError):
             solve(
-                from_features(voxels, features(voxels), target),
+                from_features(voxels, features(voxels), target, default_weights()),
                 seed,
                 Noting(),
                 Effort(starts=1, polish_each=4000),

@@ -39,12 +39,15 @@ def searched(voxels: Voxels, template: str, share: bool, seeds: int) -> list[Run
     from fabfold.errors import NoSolutionError
     from fabfold.fold.lattice_foldability import LatticeFoldability
     from fabfold.lattice.shipped import load_template
+    from fabfold.recipe.recipe_wishes import default_weights
     from fabfold.tree.effort import Effort
     from fabfold.tree.problem import from_features
     from fabfold.tree.solve import solve
     from fabfold.voxels.features import features
 
-    problem = from_features(voxels, features(voxels), load_template(template), share=share)
+    problem = from_features(
+        voxels, features(voxels), load_template(template), default_weights(), share=share
+    )
     effort = Effort(polish_best=60, restarts=8, starts=2)
     runs = []
     for seed in range(seeds):

@@ -15,6 +15,7 @@ from fabfold.fold.lattice_paths import find_path, free_moves
 from fabfold.fold.reference import TOUCH, path_overlap
 from fabfold.lattice.rotations import FACES, ROTATIONS, parity
 from fabfold.lattice.shipped import load_template
+from fabfold.recipe.recipe_wishes import default_weights
 from fabfold.tree.assembly import fold_tree, hinge_choice
 from fabfold.tree.catalogue import edge_sides, edge_turn, face_transforms, joint_types, realizations
 from fabfold.tree.effort import Effort
@@ -41,6 +42,7 @@ def doubled(cells, template, joints="S+D", hinge=None):
         rigid=np.ones(len(pairs), dtype=bool),
         hinge=np.ones((len(pairs), 4), dtype=bool) if hinge is None else hinge,
         depth=np.zeros((len(cells), 6)),
+        weights=default_weights(),
         double=np.ones(len(pairs), dtype=bool),
         joints=joints,
     )

@@ -9,6 +9,7 @@ from tree_cases import animal, face_pairs, solid_problem, strip
 
 from fabfold.lattice.rotations import FACES, ROTATIONS, parity
 from fabfold.lattice.shipped import load_template
+from fabfold.recipe.recipe_wishes import default_weights
 from fabfold.tree.assembly import hinge_choice
 from fabfold.tree.initial_poses import grow
 from fabfold.tree.large_neighbourhood import ruin_and_recreate
@@ -147,6 +148,7 @@ def test_extra_cost_is_added_and_some_pairs_stay_rigid():
         rigid=np.ones(len(pairs), dtype=bool),
         hinge=np.ones((len(pairs), 4), dtype=bool),
         depth=np.zeros((8, 6)),
+        weights=default_weights(),
         extra_cost=extra_cost,
         always_rigid=always_rigid,
     )

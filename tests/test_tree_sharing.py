@@ -22,6 +22,7 @@ from fabfold.lattice.rotations import FACES, ROTATIONS
 from fabfold.lattice.shipped import load_template
 from fabfold.proof.certify import certify
 from fabfold.proof.replay import replay
+from fabfold.recipe.recipe_wishes import default_weights
 from fabfold.tree.assembly import hinge_choice
 from fabfold.tree.beam import fill_beam
 from fabfold.tree.catalogue import edge_sides
@@ -135,6 +136,7 @@ def crowd(count=24, template="box-3x3x3", seed=0):
         rigid=np.ones(len(pairs), dtype=bool),
         hinge=np.ones((len(pairs), 4), dtype=bool),
         depth=rng.random((len(cells), 6)),
+        weights=default_weights(),
         share=material,
     ), material
 
@@ -245,6 +247,7 @@ def test_without_sharing_there_is_nothing_of_it():
         "rigid": np.ones(len(pairs), dtype=bool),
         "hinge": np.ones((len(pairs), 4), dtype=bool),
         "depth": np.zeros((8, 6)),
+        "weights": default_weights(),
     }
     full_problem = tree_problem(cells, load_template("box-2x2x2"), share=full, **arguments)
     assert full_problem.tables.max_shared == 0
@@ -278,8 +281,8 @@ def folded():
     voxels = bar()
     template = load_template("box-5x2x1")
     with pytest.raises(NoTreeError, match="cannot go into"):
-        from_features(voxels, features(voxels), template)
-    problem = from_features(voxels, features(voxels), template, share=True)
+        from_features(voxels, features(voxels), template, default_weights())
+    problem = from_features(voxels, features(voxels), template, default_weights(), share=True)
     found = solve(problem, 0, LatticeFoldability(), Effort(polish_best=10, restarts=10))
     return voxels, problem, found[0]
 

@@ -18,7 +18,7 @@ from fabfold.kit.stage_files import save_solid
 from fabfold.lattice.rotations import FACES, ROTATIONS, rotation_about
 from fabfold.lattice.shipped import load_template
 from fabfold.recipe.recipe import make_recipe
-from fabfold.recipe.recipe_wishes import make_wishes, weights_of, wished
+from fabfold.recipe.recipe_wishes import default_weights, make_wishes, weights_of, wished
 from fabfold.search.rounds import _usable
 from fabfold.solid.load import load_solid, solid_from_mesh
 from fabfold.solid.raw import RawMesh
@@ -68,6 +68,7 @@ def search(voxels, template, wishes, seed=0):
         voxels,
         found,
         shape,
+        default_weights(),
         extra_cost=wishes.extra_cost(voxels, shape),
         always_rigid=rigid_pairs(protected, found),
     )
@@ -262,6 +263,7 @@ def small_problem(template):
         rigid=np.ones(len(pairs), dtype=bool),
         hinge=np.ones((len(pairs), 4), dtype=bool),
         depth=np.zeros((len(cells), 6)),
+        weights=default_weights(),
     )
 
 

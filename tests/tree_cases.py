@@ -6,7 +6,8 @@ import numpy as np
 
 from fabfold.lattice.rotations import FACES, parity
 from fabfold.lattice.shipped import load_template
-from fabfold.tree.problem import TreeProblem, Weights, tree_problem
+from fabfold.recipe.recipe_wishes import default_weights
+from fabfold.tree.problem import TreeProblem, tree_problem
 
 
 def face_pairs(cells):
@@ -33,7 +34,7 @@ def solid_problem(cells, template, *, hinge=None, rigid=None, depth=None, weight
         rigid=np.ones(len(pairs), dtype=bool) if rigid is None else rigid,
         hinge=np.ones((len(pairs), 4), dtype=bool) if hinge is None else hinge,
         depth=np.zeros((len(cells), 6)) if depth is None else depth,
-        weights=weights or Weights(),
+        weights=weights or default_weights(),
     )
 
 

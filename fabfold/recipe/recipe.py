@@ -22,7 +22,7 @@ from fabfold.recipe.targets import is_file_name
 from fabfold.tree.catalogue import JointSet
 from fabfold.version import __version__
 
-__all__ = ["Recipe", "read_recipe"]
+__all__ = ["Recipe", "make_recipe", "read_recipe"]
 
 Vector = tuple[float, float, float]
 

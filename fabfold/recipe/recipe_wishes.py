@@ -5,18 +5,23 @@ from __future__ import annotations
 from typing import Any
 
 from fabfold.errors import RecipeError
-from fabfold.recipe.recipe import Recipe
+from fabfold.recipe.recipe import Recipe, make_recipe
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.regions import parse_keep, parse_region, sample_region, sample_surface
 from fabfold.tree.problem import Weights
 from fabfold.wishes.keep import Keep
 from fabfold.wishes.wish_list import Wishes
 
-__all__ = ["make_wishes", "weights_of", "wished"]
+__all__ = ["default_weights", "make_wishes", "weights_of", "wished"]
 
 #: How far the knob between hinges and surface reaches: at its ends one weight is this many times
 #: greater, and the other as many times smaller.
 REACH = 4.0
+
+
+def default_weights() -> Weights:
+    """Weights of a recipe that says nothing of them: those of the paper."""
+    return weights_of(make_recipe(model="sample:car", template="box-3x4x4"))
 
 
 def weights_of(recipe: Recipe) -> Weights:
@@ -73,6 +78,6 @@ def wished(recipe: Recipe) -> list[Any]:
         "prefer": recipe.prefer,
         "share": recipe.share,
     }
-    idle = {"keep": [], "keep_weight": 0.0, "protect": [], "joints_inside": False, "void": 0.0}
-    usual = {**idle, "prefer": 0.5, "joints": "S", "double_weight": 0.12, "share": False}
+    usual = {name: Recipe.model_fields[name].default for name in fields}
+    usual |= {"keep": [], "keep_weight": 0.0, "protect": []}
     return [[name, value] for name, value in fields.items() if value != usual[name]]

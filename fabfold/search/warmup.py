@@ -8,6 +8,7 @@ import numpy as np
 
 from fabfold.fold.lattice_foldability import LatticeFoldability
 from fabfold.lattice.shipped import load_template
+from fabfold.recipe.recipe_wishes import default_weights
 from fabfold.search.seeds import Job
 from fabfold.tree.catalogue import JointSet
 from fabfold.tree.effort import EFFORTS
@@ -41,6 +42,7 @@ def warm_up_job(joints: JointSet = "S") -> Job:
         rigid=np.ones(count, np.bool_),
         hinge=np.ones((count, 4), np.bool_),
         depth=np.zeros((len(cells), 6)),
+        weights=default_weights(),
         double=np.ones(count, np.bool_),
         joints=joints,
     )

@@ -51,18 +51,18 @@ class Weights:
     ----------
     surface : float
         Weight of the surface's energy (Eq. 8), the sum of mean ray depths.
-    rigid : float
-        Weight of a rigid joint.
     single : float
         Weight of a single hinge (Eq. 9).
     double : float
         Weight of a double hinge (Eq. 9).
+    rigid : float
+        Weight of a rigid joint.
     """
 
-    surface: float = 0.3
+    surface: float
+    single: float
+    double: float
     rigid: float = 0.0
-    single: float = 0.1
-    double: float = 0.12
 
 
 @dataclass(frozen=True)
@@ -208,8 +208,8 @@ def tree_problem(
     rigid: NDArray[np.bool_],
     hinge: NDArray[np.bool_],
     depth: NDArray[np.float64],
+    weights: Weights,
     fill: NDArray[np.float64] | None = None,
-    weights: Weights | None = None,
     extra_cost: NDArray[np.floating] | None = None,
     always_rigid: NDArray[np.bool_] | None = None,
     double: NDArray[np.bool_] | None = None,
@@ -233,10 +233,10 @@ def tree_problem(
         :func:`fabfold.tree.catalogue.edge_sides`.
     depth : (n, 6) float array
         Mean ray depth into each voxel from each of its faces, 0 to 1 (Eq. 8).
+    weights : Weights
+        Weights of the energy.
     fill : (n,) float array, optional
         Share of each cell that is material.
-    weights : Weights, optional
-        Weights of the energy; by default those of the paper.
     extra_cost : (n, 24 m) float array, optional
         Energy added for a voxel at a pose, on top of the surface's.
     always_rigid : (k,) bool array, optional
@@ -259,7 +259,6 @@ def tree_problem(
     NoTreeError
         If there are more voxels than template cells, or no tree can join the voxels at all.
     """
-    weights = weights or Weights()
     cells = np.asarray(cells, dtype=np.int32).reshape(-1, 3)
     count = len(cells)
     masks = np.full(count, WHOLE, np.uint8) if share is None else octant_masks(share)
@@ -351,7 +350,7 @@ def from_features(
     voxels: Voxels,
     features: Features,
     template: Template,
-    weights: Weights | None = None,
+    weights: Weights,
     *,
     extra_cost: NDArray[np.floating] | None = None,
     always_rigid: NDArray[np.bool_] | None = None,
@@ -368,8 +367,8 @@ def from_features(
         Its printable joints and ray depths.
     template : Template
         The shape to fill.
-    weights : Weights, optional
-        Weights of the energy; by default those of the paper.
+    weights : Weights
+        Weights of the energy.
     extra_cost : (n, 24 m) float array, optional
         Energy added for a voxel at a pose, on top of the surface's.
     always_rigid : (k,) bool array, optional
