@@ -18,8 +18,8 @@ from hinges import single as _single
 from hinges.mesh import _double as _double_mesh
 from hinges.mesh import _single as _single_mesh
 from hinges.mesh import double_hinge_meshes, single_hinge_meshes
-from hinges.plan import plan_single
 from hinges.plan_double import plan_double
+from hinges.plan_single import plan_single
 
 
 def forget() -> None:

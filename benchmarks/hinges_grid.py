@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "hinges"))
 from hinge_grid import double_plan_of, doubles, plan_of, singles
 from hinge_measure import double_bodies, exact, gap, overlap, posed, single_gaps
 
-from hinges.errors import HingeError
+from hinges.exceptions import HingeError
 
 ANGLES = np.linspace(0.0, 180.0, 19)
 

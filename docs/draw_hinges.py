@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import importlib.util
+import io
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from build123d import Box, Mode, Plane, Pos
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
 
+from fabfold.export.render import Mesh, View, render
+from fabfold.files import write_bytes
 from hinges import (
     Bracket,
     ConePin,
@@ -23,17 +30,26 @@ from hinges import (
     ScrewPin,
     SingleHinge,
     SnapDimple,
-    SnapSpec,
     SnapTongue,
     Stops,
     StraightPin,
 )
-from hinges.picture import PALETTE, Body, Camera, bodies_of, render, save, sheet
 
 HOME = Path(__file__).parent / "hinges"
-SIZE = (330, 250)
-LYING = Camera(-60.0, 28.0, up=(0.0, 1.0, 0.0))
-ALONG = Camera(-90.0, 8.0, up=(0.0, 1.0, 0.0))
+BLUE, ORANGE, GREEN, GREY = (92, 143, 199), (242, 168, 82), (133, 189, 122), (184, 184, 191)
+UPRIGHT = View(
+    azimuth_deg=-55.0, elevation_deg=35.0, size=(330, 250), samples=3, lights=30, ground=False,
+    edges=0.9,
+)  # fmt: skip
+#: For hinges as they are drawn, their y upwards.
+LYING = replace(UPRIGHT, azimuth_deg=-60.0, elevation_deg=28.0)
+ALONG = replace(UPRIGHT, azimuth_deg=-90.0, elevation_deg=8.0)
+ACROSS = replace(UPRIGHT, azimuth_deg=15.0, elevation_deg=12.0)
+#: Turns y up: from the hinge's frame into the picture's.
+Y_UP = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
+
+Color = tuple[int, int, int]
+Picture = NDArray[np.uint8]
 
 
 def halves(hinge: SingleHinge) -> list[Any]:
@@ -47,16 +63,52 @@ def cut(shapes: Sequence[Any], plane: Plane = Plane.YZ) -> list[Any]:
     return [shape - box for shape in shapes]
 
 
-def picture(shapes: Sequence[Any], camera: Camera = LYING, size: tuple[int, int] = SIZE) -> Any:
-    """Draw shapes, blue, orange and grey in turn."""
-    colors = (PALETTE[0], PALETTE[1], PALETTE[3])
-    return render(bodies_of(shapes, colors), size, camera)
+def meshes_of(shapes: Sequence[Any], colors: Sequence[Color]) -> tuple[list[Mesh], list[Color]]:
+    """Tessellate shapes, one colour a shape, in turn."""
+    meshes, painted = [], []
+    for index, shape in enumerate(shapes):
+        for solid in shape.solids():
+            points, triangles = solid.tessellate(0.02, 0.2)
+            vertices = np.array([(point.X, point.Y, point.Z) for point in points])
+            meshes.append((vertices, np.array(triangles, dtype=np.int32)))
+            painted.append(colors[index % len(colors)])
+    return meshes, painted
 
 
-def page(name: str, rows: Sequence[tuple[str, Any]], columns: int = 3) -> None:
-    """Save labelled pictures as one."""
-    save(sheet([image for _, image in rows], [text for text, _ in rows], columns), HOME / name)
-    print(name, (HOME / name).stat().st_size // 1024, "kB")
+def picture(
+    shapes: Sequence[Any],
+    view: View = LYING,
+    colors: Sequence[Color] = (BLUE, ORANGE, GREY),
+    *,
+    y_up: bool = True,
+) -> Picture:
+    """Draw shapes, with y up or with z up."""
+    meshes, painted = meshes_of(shapes, colors)
+    if y_up:
+        meshes = [(vertices @ Y_UP.T, faces) for vertices, faces in meshes]
+    return render(meshes, np.array(painted, dtype=np.uint8), None, view)
+
+
+def save(image: Image.Image, path: Path) -> None:
+    """Write a PNG of 128 colours, so that a picture stays small."""
+    stream = io.BytesIO()
+    image.quantize(128, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True)
+    write_bytes(path, stream.getvalue())
+    print(path.name, path.stat().st_size // 1024, "kB")
+
+
+def page(name: str, rows: Sequence[tuple[str, Picture]], columns: int = 3) -> None:
+    """Save pictures of one size as one, each with its caption below."""
+    high, wide, _ = rows[0][1].shape
+    band = 26
+    lines = -(-len(rows) // columns)
+    whole = Image.new("RGB", (wide * min(columns, len(rows)), (high + band) * lines), "white")
+    pen, font = ImageDraw.Draw(whole), ImageFont.load_default(15)
+    for index, (caption, image) in enumerate(rows):
+        x, y = wide * (index % columns), (high + band) * (index // columns)
+        whole.paste(Image.fromarray(image), (x, y))
+        pen.text((x + wide // 2, y + high + band // 2), caption, "black", font=font, anchor="mm")
+    save(whole, HOME / name)
 
 
 def single_pictures() -> None:
@@ -94,7 +146,7 @@ def single_pictures() -> None:
                 "Leaf(..., flat=True)",
                 picture(
                     halves(SingleHinge(40, radius=3, clearance=0.3, leaf=Leaf(14, 1.9, flat=True))),
-                    Camera(-60.0, -28.0, up=(0.0, 1.0, 0.0)),
+                    replace(LYING, elevation_deg=-28.0),
                 ),
             ),
             (
@@ -139,7 +191,7 @@ def pin_pictures() -> None:
         ("RodPin(2.0)", {"pin": RodPin(2.0)}),
     ):
         hinge = SingleHinge(**{"length": 20, "clearance": 0.3, **options})
-        rows.append((text, picture(cut(halves(hinge), Plane.YZ), Camera(15.0, 12.0, up=(0, 1, 0)))))
+        rows.append((text, picture(cut(halves(hinge)), ACROSS)))
     page("pins.png", rows)
     rows = []
     for bore in ("round", "teardrop", "octagon"):
@@ -170,12 +222,22 @@ def stop_pictures() -> None:
     clicks = SingleHinge(
         30, clearance=0.3, radius=3.4, pin=ConePin(1.5), detents=Detents((0.0, 90.0, 180.0))
     )
-    bump = Pos(0, 0, 0) * clicks.parent_half
     rows += [
-        ("detents: the bump", picture([_end(bump, -3.5)], Camera(-70.0, 40.0, up=(0, 0, 1)))),
+        (
+            "detents: the bump",
+            picture(
+                [_end(clicks.parent_half, -3.5)],
+                replace(UPRIGHT, azimuth_deg=-70.0, elevation_deg=40.0),
+                y_up=False,
+            ),
+        ),
         (
             "detents: dimples and tracks",
-            picture([clicks.child_half], Camera(60.0, -40.0, up=(0, 0, 1))),
+            picture(
+                [clicks.child_half],
+                replace(UPRIGHT, azimuth_deg=60.0, elevation_deg=-40.0),
+                y_up=False,
+            ),
         ),
     ]
     page("stops.png", rows)
@@ -189,15 +251,9 @@ def _end(shape: Any, level: float) -> Any:
 def double_pictures() -> None:
     """Every parameter of the double hinge."""
 
-    def draw(camera: Camera = LYING, **options: Any) -> Any:
+    def draw(**options: Any) -> Picture:
         hinge = DoubleHinge(**{"size": 20, "clearance": 0.3, **options})
-        colors = (PALETTE[0], PALETTE[2], PALETTE[1])
-        bodies = [
-            body
-            for solid, color in zip(hinge.solids(), colors, strict=True)
-            for body in bodies_of([solid], (color,))
-        ]
-        return render(bodies, SIZE, camera)
+        return picture(hinge.solids(), colors=(BLUE, GREEN, ORANGE))
 
     page(
         "double.png",
@@ -218,13 +274,13 @@ def double_pictures() -> None:
     boxes = [Pos(x, 0, 0) * Box(side, side, side) for x in (-10, 10)]
     parent, link, child = hinge.fit(*boxes)
     rows = [
-        ("parent_carve", render(bodies_of([hinge.parent_carve]), SIZE, LYING)),
-        ("parent's box", render(bodies_of([parent]), SIZE, Camera(40.0, 28.0, up=(0, 1, 0)))),
+        ("parent_carve", picture([hinge.parent_carve])),
+        ("parent's box", picture([parent], replace(LYING, azimuth_deg=40.0))),
     ]
     parent.joints["link"].connect_to(link.joints["parent"], angle=120)
     link.joints["child"].connect_to(child.joints["link"], angle=60)
-    colors = (PALETTE[0], PALETTE[2], PALETTE[1])
-    rows.append(("fit(box, box)", render(bodies_of([parent, link, child], colors), SIZE, LYING)))
+    colors = (BLUE, GREEN, ORANGE)
+    rows.append(("fit(box, box)", picture([parent, link, child], colors=colors)))
     page("double_fit.png", rows)
 
 
@@ -234,7 +290,6 @@ def other_pictures() -> None:
     closed = MagnetPocket(Magnet(6, 3), "captured", mode=Mode.PRIVATE)
     round_ = MagnetPocket(Magnet(6, 3), mode=Mode.PRIVATE)
     square = MagnetPocket(Magnet(6, 3, "square"), mode=Mode.PRIVATE)
-    upright = Camera(-60.0, 35.0)
     tongue, dimple = SnapTongue(mode=Mode.PRIVATE), SnapDimple(mode=Mode.PRIVATE)
     mate = Pos(0, 0, 5.3) * Box(10, 10, 10) - dimple
     base = Pos(0, 0, -2) * Box(10, 10, 4)
@@ -242,24 +297,26 @@ def other_pictures() -> None:
     page(
         "retention.png",
         [
-            ("MagnetPocket, press fit", picture([block - round_], upright)),
-            ("square", picture([block - square], upright)),
+            ("MagnetPocket, press fit", picture([block - round_], y_up=False)),
+            ("square", picture([block - square], y_up=False)),
             (
                 "captured by a pause (cut open)",
-                picture(cut([block - closed, closed.magnet_part], Plane.XZ), upright),
+                picture(cut([block - closed, closed.magnet_part], Plane.XZ), y_up=False),
             ),
-            ("SnapTongue", picture([base + tongue], upright)),
-            ("SnapDimple (cut open)", picture(cut([mate], Plane.XZ), upright)),
-            ("closed (cut open)", picture(cut(whole, Plane.XZ), Camera(-90.0, 10.0))),
+            ("SnapTongue", picture([base + tongue], y_up=False)),
+            ("SnapDimple (cut open)", picture(cut([mate], Plane.XZ), y_up=False)),
+            (
+                "closed (cut open)",
+                picture(cut(whole, Plane.XZ), replace(ALONG, elevation_deg=10.0), y_up=False),
+            ),
         ],
     )
-    assert SnapSpec().strain < 0.008
     coupon = Coupon()
-    bodies = [
-        Body(mesh.vertices, mesh.faces, PALETTE[3] if not index else PALETTE[(index - 1) % 3])
-        for index, mesh in enumerate(coupon.meshes)
-    ]
-    save(render(bodies, (960, 420), Camera(-75.0, 48.0)), HOME / "coupon.png")
+    view = replace(UPRIGHT, azimuth_deg=-75.0, elevation_deg=48.0, size=(960, 420))
+    colors = [(BLUE, ORANGE, GREEN)[(index - 1) % 3] if index else GREY for index in range(25)]
+    meshes = [(mesh.vertices, mesh.faces) for mesh in coupon.meshes]
+    drawn = render(meshes, np.array(colors, dtype=np.uint8), None, view)
+    save(Image.fromarray(drawn), HOME / "coupon.png")
 
 
 def example_pictures() -> None:
@@ -275,16 +332,17 @@ def example_pictures() -> None:
         return module
 
     box, lid = load("01_lidded_box_build123d").main()
-    upright = Camera(-55.0, 35.0)
-    rows = [("01: as printed", picture([box, lid], upright))]
+    rows = [("01: as printed", picture([box, lid], UPRIGHT, y_up=False))]
     box.joints["hinge"].connect_to(lid.joints["hinge"], angle=120)
-    rows.append(("01: half closed", picture([box, lid], upright)))
+    rows.append(("01: half closed", picture([box, lid], UPRIGHT, y_up=False)))
     base, back, link, lip = load("03_phone_stand_build123d").main()
     base.joints["back"].connect_to(back.joints["back"], angle=103)
     base.joints["link"].connect_to(link.joints["parent"], angle=180)
     link.joints["child"].connect_to(lip.joints["link"], angle=0)
-    bodies = bodies_of([base, back, link, lip], (PALETTE[0], PALETTE[1], PALETTE[2], PALETTE[3]))
-    rows.append(("03: in use", render(bodies, SIZE, Camera(-30.0, 20.0))))
+    in_use = [base, back, link, lip]
+    view = replace(UPRIGHT, azimuth_deg=-30.0, elevation_deg=20.0)
+    colors = (BLUE, ORANGE, GREEN, GREY)
+    rows.append(("03: in use", picture(in_use, view, colors, y_up=False)))
     page("examples.png", rows)
 
 

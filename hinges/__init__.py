@@ -14,36 +14,38 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+#: The module that each public name lives in.
 _HOMES = {
     "Bracket": "leaf",
     "Clearance": "clearance",
     "ConePin": "pins",
-    "Coupon": "coupon",
+    "Coupon": "tolerance_coupon",
     "Detents": "stops",
     "DoubleHinge": "double",
     "DoubleHingeCarve": "double",
     "DoubleHingePart": "double",
     "FilamentPin": "hardware",
-    "FitError": "errors",
+    "FitError": "exceptions",
     "HingeCarve": "single",
-    "HingeError": "errors",
+    "HingeError": "exceptions",
     "HingeHalf": "single",
-    "KernelError": "errors",
+    "KernelError": "exceptions",
     "Leaf": "leaf",
+    "Magnet": "retention",
     "MagnetPocket": "retention",
-    "Play": "wobble",
-    "play": "wobble",
+    "Play": "joint_play",
     "RodPin": "hardware",
     "ScrewPin": "hardware",
     "SingleHinge": "single",
     "SnapDimple": "retention",
-    "SnapTongue": "retention",
-    "Magnet": "retention",
     "SnapSpec": "retention",
+    "SnapTongue": "retention",
     "Stops": "stops",
     "StraightPin": "pins",
     "hinge_location": "single",
-    "write_coupon": "coupon",
+    "play": "joint_play",
+    "total_play": "joint_play",
+    "write_coupon": "tolerance_coupon",
 }
 
 __all__ = sorted(_HOMES)  # noqa: PLE0605

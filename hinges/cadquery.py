@@ -28,10 +28,11 @@ handles of the one kernel: nothing is copied or written to disk.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, Unpack
 
-from .errors import HingeError
+from .exceptions import HingeError
 from .kernel import check_kernel
+from .options import DoubleHingeKeywords, SingleHingeKeywords
 
 check_kernel(cadquery=True)
 
@@ -53,11 +54,13 @@ def to_cadquery(part: Any) -> cq.Shape:
     Parameters
     ----------
     part : build123d Shape
+        What to hand over.
 
     Returns
     -------
     cadquery Shape
-        Of the matching class, on the same kernel object. A part of one solid comes as a Solid.
+        Shape of the matching class, on the same kernel object. A part of one solid comes as a
+        Solid.
     """
     solids = part.solids() if hasattr(part, "solids") else []
     return cq.Shape.cast(solids[0].wrapped if len(solids) == 1 else part.wrapped)
@@ -69,11 +72,12 @@ def from_cadquery(shape: Any) -> Any:
     Parameters
     ----------
     shape : cadquery Shape or Workplane
+        What to hand over.
 
     Returns
     -------
     build123d Part
-        On the same kernel objects.
+        Part on the same kernel objects.
 
     Raises
     ------
@@ -94,7 +98,7 @@ def from_cadquery(shape: Any) -> Any:
     return bd.Part([bd.Solid(solid.wrapped) for solid in found])
 
 
-def _single(length: float, options: dict[str, Any]) -> Any:
+def _single(length: float, options: SingleHingeKeywords) -> Any:
     from build123d import Mode
 
     from .single import SingleHinge
@@ -110,7 +114,7 @@ def _pieces(part: Any) -> list[cq.Shape]:
     return [cq.Solid(solid.wrapped) for solid in part.solids()]
 
 
-def _half_and_carve(side: str, length: float, options: dict[str, Any]) -> tuple[Any, Any]:
+def _half_and_carve(side: str, length: float, options: SingleHingeKeywords) -> tuple[Any, Any]:
     hinge = _single(length, options)
     if side == "parent":
         return hinge.parent_half, hinge.parent_carve
@@ -130,17 +134,73 @@ def _points(self: cq.Workplane) -> cq.Workplane:
 
 
 def single_hinge(
-    self: cq.Workplane, length: float, combine: bool = True, clean: bool = True, **options: Any
+    self: cq.Workplane,
+    length: float,
+    combine: bool = True,
+    clean: bool = True,
+    **options: Unpack[SingleHingeKeywords],
 ) -> cq.Workplane:
-    """Add both halves of a single hinge at every point of the stack."""
+    """Add both halves of a single hinge at every point of the stack.
+
+    Parameters
+    ----------
+    self : Workplane
+        The workplane that it is a method of.
+    length : float
+        Length in mm of the edge that the hinge is for.
+    combine : bool
+        Whether to unite it with the solid under construction.
+    clean : bool
+        Whether CadQuery merges faces that lie in one surface.
+    **options
+        The other keywords of :class:`hinges.SingleHinge`.
+
+    Returns
+    -------
+    Workplane
+        The workplane with the new solids on its stack.
+
+    Raises
+    ------
+    HingeError
+        If the hinge cannot be made.
+    """
     whole = _whole(_single(length, options))
     return _points(self).eachpoint(whole.moved, True, combine, clean)
 
 
 def double_hinge(
-    self: cq.Workplane, size: float, combine: bool = True, clean: bool = True, **options: Any
+    self: cq.Workplane,
+    size: float,
+    combine: bool = True,
+    clean: bool = True,
+    **options: Unpack[DoubleHingeKeywords],
 ) -> cq.Workplane:
-    """Add the three bodies of a double hinge at every point of the stack."""
+    """Add the three bodies of a double hinge at every point of the stack.
+
+    Parameters
+    ----------
+    self : Workplane
+        The workplane that it is a method of.
+    size : float
+        Side of the shared face in mm.
+    combine : bool
+        Whether to unite it with the solid under construction.
+    clean : bool
+        Whether CadQuery merges faces that lie in one surface.
+    **options
+        The other keywords of :class:`hinges.DoubleHinge`.
+
+    Returns
+    -------
+    Workplane
+        The workplane with the new solids on its stack.
+
+    Raises
+    ------
+    HingeError
+        If the hinge cannot be made.
+    """
     from build123d import Mode
 
     from .double import DoubleHinge
@@ -155,23 +215,79 @@ def hinge_half(
     length: float,
     combine: bool = True,
     clean: bool = True,
-    **options: Any,
+    **options: Unpack[SingleHingeKeywords],
 ) -> cq.Workplane:
-    """Add one half, "parent" or "child", at every point of the stack."""
+    """Add one half at every point of the stack, without cutting.
+
+    Parameters
+    ----------
+    self : Workplane
+        The workplane that it is a method of.
+    side : {"parent", "child"}
+        Which of the two bodies it is for.
+    length : float
+        Length in mm of the edge that the hinge is for.
+    combine : bool
+        Whether to unite it with the solid under construction.
+    clean : bool
+        Whether CadQuery merges faces that lie in one surface.
+    **options
+        The other keywords of :class:`hinges.SingleHinge`.
+
+    Returns
+    -------
+    Workplane
+        The workplane with the new solids on its stack.
+
+    Raises
+    ------
+    HingeError
+        If the hinge cannot be made.
+    """
     half = to_cadquery(_half_and_carve(side, length, options)[0])
     return _points(self).eachpoint(half.moved, True, combine, clean)
 
 
 def cut_hinge(
-    self: cq.Workplane, side: str, length: float, clean: bool = True, **options: Any
+    self: cq.Workplane,
+    side: str,
+    length: float,
+    clean: bool = True,
+    **options: Unpack[SingleHingeKeywords],
 ) -> cq.Workplane:
-    """Cut what a body gives up to a hinge at every point of the stack."""
+    """Cut what a body gives up to a hinge at every point of the stack.
+
+    Parameters
+    ----------
+    self : Workplane
+        The workplane that it is a method of.
+    side : {"parent", "child"}
+        Which of the two bodies it is for.
+    length : float
+        Length in mm of the edge that the hinge is for.
+    clean : bool
+        Whether CadQuery merges faces that lie in one surface.
+    **options
+        The other keywords of :class:`hinges.SingleHinge`.
+
+    Returns
+    -------
+    Workplane
+        The workplane with the new solids on its stack.
+
+    Raises
+    ------
+    HingeError
+        If the hinge cannot be made.
+    """
     pieces = _pieces(_half_and_carve(side, length, options)[1])
     cutter = cq.Compound.makeCompound(pieces)
     return _points(self).eachpoint(cutter.moved, True, "cut", clean)
 
 
-def _fitted(self: cq.Workplane, side: str, length: float, options: dict[str, Any]) -> cq.Workplane:
+def _fitted(
+    self: cq.Workplane, side: str, length: float, options: SingleHingeKeywords
+) -> cq.Workplane:
     half, carve = _half_and_carve(side, length, options)
     cutters, added = _pieces(carve), _pieces(half)
     body = self.findSolid()
@@ -196,30 +312,117 @@ def _fitted(self: cq.Workplane, side: str, length: float, options: dict[str, Any
     return self.newObject([solids[0] if len(solids) == 1 else body])
 
 
-def hinge_parent(self: cq.Workplane, length: float, **options: Any) -> cq.Workplane:
-    """Let the parent's half into the solid under construction at every point of the stack."""
+def hinge_parent(
+    self: cq.Workplane, length: float, **options: Unpack[SingleHingeKeywords]
+) -> cq.Workplane:
+    """Let the parent's half into the solid under construction at every point of the stack.
+
+    Parameters
+    ----------
+    self : Workplane
+        The workplane that it is a method of.
+    length : float
+        Length in mm of the edge that the hinge is for.
+    **options
+        The other keywords of :class:`hinges.SingleHinge`.
+
+    Returns
+    -------
+    Workplane
+        The workplane with the new solids on its stack.
+
+    Raises
+    ------
+    HingeError
+        If the hinge cannot be made, or the body does not reach its half.
+    """
     return _fitted(self, "parent", length, options)
 
 
-def hinge_child(self: cq.Workplane, length: float, **options: Any) -> cq.Workplane:
-    """Let the child's half into the solid under construction at every point of the stack."""
+def hinge_child(
+    self: cq.Workplane, length: float, **options: Unpack[SingleHingeKeywords]
+) -> cq.Workplane:
+    """Let the child's half into the solid under construction at every point of the stack.
+
+    Parameters
+    ----------
+    self : Workplane
+        The workplane that it is a method of.
+    length : float
+        Length in mm of the edge that the hinge is for.
+    **options
+        The other keywords of :class:`hinges.SingleHinge`.
+
+    Returns
+    -------
+    Workplane
+        The workplane with the new solids on its stack.
+
+    Raises
+    ------
+    HingeError
+        If the hinge cannot be made, or the body does not reach its half.
+    """
     return _fitted(self, "child", length, options)
 
 
-def parent_of(length: float, **options: Any) -> Callable[[cq.Workplane], cq.Workplane]:
-    """Make a function for ``Workplane.invoke`` that lets the parent's half in."""
+def parent_of(
+    length: float, **options: Unpack[SingleHingeKeywords]
+) -> Callable[[cq.Workplane], cq.Workplane]:
+    """Make a function for ``Workplane.invoke`` that lets the parent's half in.
+
+    Parameters
+    ----------
+    length : float
+        Length in mm of the edge that the hinge is for.
+    **options
+        The other keywords of :class:`hinges.SingleHinge`.
+
+    Returns
+    -------
+    callable
+        A function from a workplane to a workplane.
+    """
     return lambda workplane: hinge_parent(workplane, length, **options)
 
 
-def child_of(length: float, **options: Any) -> Callable[[cq.Workplane], cq.Workplane]:
-    """Make a function for ``Workplane.invoke`` that lets the child's half in."""
+def child_of(
+    length: float, **options: Unpack[SingleHingeKeywords]
+) -> Callable[[cq.Workplane], cq.Workplane]:
+    """Make a function for ``Workplane.invoke`` that lets the child's half in.
+
+    Parameters
+    ----------
+    length : float
+        Length in mm of the edge that the hinge is for.
+    **options
+        The other keywords of :class:`hinges.SingleHinge`.
+
+    Returns
+    -------
+    callable
+        A function from a workplane to a workplane.
+    """
     return lambda workplane: hinge_child(workplane, length, **options)
 
 
-def hinge_at(length: float, **options: Any) -> Callable[[Iterable[Any]], list[cq.Shape]]:
+def hinge_at(
+    length: float, **options: Unpack[SingleHingeKeywords]
+) -> Callable[[Iterable[Any]], list[cq.Shape]]:
     """Make a function for ``Workplane.apply``: every object on the stack becomes a hinge.
 
-    A location is taken as it is, any other object by its centre.
+    Parameters
+    ----------
+    length : float
+        Length in mm of the edge that the hinge is for.
+    **options
+        The other keywords of :class:`hinges.SingleHinge`.
+
+    Returns
+    -------
+    callable
+        A function from objects to shapes. It takes a location as it is, and any other object by its
+        centre.
     """
 
     def build(objects: Iterable[Any]) -> list[cq.Shape]:

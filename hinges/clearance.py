@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from .errors import HingeError
+from .exceptions import HingeError
 
 __all__ = ["PROCESSES", "Clearance", "Process", "millimetres"]
 
@@ -36,12 +36,12 @@ def millimetres(value: float | str) -> float:
     Parameters
     ----------
     value : float or str
-        ``0.3``, ``"0.3 mm"``, ``"300 um"``, ``"12 thou"`` or ``"0.012 in"``.
+        The length: ``0.3``, ``"0.3 mm"``, ``"300 um"``, ``"12 thou"`` or ``"0.012 in"``.
 
     Returns
     -------
     float
-        In mm.
+        Length in mm.
 
     Raises
     ------
@@ -74,9 +74,9 @@ class Process:
     name : str
         Short name.
     radial, axial : float
-        Default clearances in mm, per side, normal to the surface.
+        Default clearances across and along the axis in mm, per side, normal to the surface.
     low, high : float
-        Range that makers and vendors report for printed-in-place joints, in mm.
+        Range of clearances that makers and vendors report for printed-in-place joints, in mm.
     wall : float
         Thinnest wall in mm that carries load.
     source : str
@@ -194,7 +194,17 @@ class Clearance:
 
     @classmethod
     def of(cls, process: str) -> Clearance:
-        """Take the default of a printing process: fdm, sla, sls, mjf or polyjet.
+        """Take the default of a printing process.
+
+        Parameters
+        ----------
+        process : str
+            "fdm", "sla", "sls", "mjf" or "polyjet", in small or capital letters.
+
+        Returns
+        -------
+        Clearance
+            The process's default, with the source of the figure.
 
         Raises
         ------
@@ -210,7 +220,23 @@ class Clearance:
 
     @classmethod
     def read(cls, value: Clearance | float | str) -> Clearance:
-        """Accept a `Clearance`, a number in mm, a length with a unit, or a process name."""
+        """Read a clearance however it was given.
+
+        Parameters
+        ----------
+        value : Clearance, float or str
+            A `Clearance`, a number in mm, a length with a unit such as "300 um", or a process.
+
+        Returns
+        -------
+        Clearance
+            The clearance that was meant.
+
+        Raises
+        ------
+        HingeError
+            If the text is neither a length nor a process, or the length is out of range.
+        """
         if isinstance(value, Clearance):
             return value
         if isinstance(value, str) and value.lower() in PROCESSES:

@@ -1,14 +1,14 @@
-"""Raised numbers made of bars, so that no font is needed."""
+"""Raised numbers of seven bars, so that no font is needed."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import HingeError
+from .exceptions import HingeError
 from .shapes import Prism, Shape
 
-__all__ = ["number"]
+__all__ = ["raised_number"]
 
 _BARS = {
     "top": (0.0, 1.0, 1.0, 1.0),
@@ -53,7 +53,7 @@ def _united(bars: list[tuple[float, float, float, float]], start: float, end: fl
     return Prism(outer[0], start, end, holes)
 
 
-def number(
+def raised_number(
     text: str,
     x: float,
     y: float,
@@ -68,9 +68,11 @@ def number(
     Parameters
     ----------
     text : str
-        Digits and points.
-    x, y, z : float
-        In mm.
+        The number: digits and points.
+    x, y : float
+        Middle of the number in mm.
+    z : float
+        Height in mm of the plane that it stands on.
     high : float
         Height of a digit in mm.
     stroke : float
@@ -81,6 +83,7 @@ def number(
     Returns
     -------
     list of Shape
+        One prism a character, in mm.
 
     Raises
     ------

@@ -20,12 +20,12 @@ from build123d import (
     Solid,
 )
 
-from .brep import build_all, build_half, build_shape, one_part, solids_of
 from .clearance import Clearance
-from .errors import HingeError
+from .exact_solids import build_all, build_half, build_shape, one_part, solids_of
+from .exceptions import HingeError
 from .leaf import Bracket
+from .options import BoreStyle
 from .pins import Pin
-from .plan import HalfPlan
 from .plan_double import (
     DoublePlan,
     DoubleSpec,
@@ -34,6 +34,7 @@ from .plan_double import (
     link_pose,
     plan_double,
 )
+from .shapes import HalfPlan
 from .single import keep_joints
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DoubleHinge", "DoubleHingeCarve", "DoubleHingePart"]
 
-Body = Literal["parent", "link", "child"]
+BodyName = Literal["parent", "link", "child"]
 COLORS = {
     "parent": (0.20, 0.45, 0.70),
     "link": (0.35, 0.65, 0.35),
@@ -49,7 +50,7 @@ COLORS = {
 }
 
 
-def _body(name: str) -> Body:
+def _body(name: str) -> BodyName:
     if name == "parent":
         return "parent"
     if name == "link":
@@ -59,19 +60,19 @@ def _body(name: str) -> Body:
     raise HingeError(f"body {name!r}: use 'parent', 'link' or 'child'")
 
 
-def _half_plan(spec: DoubleSpec, body: Body) -> HalfPlan:
+def _half_plan(spec: DoubleSpec, body: BodyName) -> HalfPlan:
     plan = plan_double(spec)
     return {"parent": plan.parent, "link": plan.link, "child": plan.child}[body]
 
 
 @lru_cache(maxsize=128)
-def _piece(spec: DoubleSpec, body: Body) -> Solid:
-    return build_half(_half_plan(spec, body), body).solid()
+def _piece(plan: HalfPlan, body: BodyName) -> Solid:
+    return build_half(plan, body).solid()
 
 
 @lru_cache(maxsize=128)
-def _carve(spec: DoubleSpec, body: Body) -> tuple[Solid, ...]:
-    return tuple(build_all(_half_plan(spec, body).carve).solids())
+def _carve(plan: HalfPlan) -> tuple[Solid, ...]:
+    return tuple(build_all(plan.carve).solids())
 
 
 def _location(matrix: Matrix) -> Location:
@@ -79,7 +80,7 @@ def _location(matrix: Matrix) -> Location:
     return Plane(origin=origin, x_dir=x_dir, z_dir=z_dir).location
 
 
-def _pose(spec: DoubleSpec, body: Body) -> Location:
+def _pose(spec: DoubleSpec, body: BodyName) -> Location:
     first, second = spec.angles
     if body == "parent":
         return Location()
@@ -98,24 +99,25 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     size : float
-        Side of the face in mm.
+        Side of the shared face in mm.
     first, second : {"+y", "-y", "+z", "-z"}
-        Edges of the parent-link and the link-child axis.
+        Edges of the parent-link and of the link-child axis.
     turns : (float, float)
         How far each axis turns: 90, 180 or 270 degrees. With 270 the plate comes to lie on the
-        neighbouring face of the body, which is let in for it.
+        neighbouring face of the body, which gets a pocket for it.
     angles : (float, float)
-        The pose that it is drawn (and printed) in, degrees.
+        Angles of the two axes in degrees at which it is drawn and printed.
     knuckles : int, optional
-        On each axis; 3 when left out. Both axes on one edge need 5 or 9.
+        Number of knuckles on each axis. 3 when left out; both axes on one edge need 5 or 9.
     radius, pin, clearance, gap, chamfer, margin, wall, bore
         As for :class:`SingleHinge`.
     plate : float, optional
         Thickness of the link plate in mm; 2, or thinner where a small barrel asks for it.
     bracket : Bracket, optional
+        What joins the knuckles of the parent's and the child's half.
     up : float
         Direction of printing in degrees about each axis, from the direction that points from the
-        body to the link; for the bores' roofs.
+        body to the link; for the roofs of the bores.
     rotation, align, mode
         As for every build123d part.
 
@@ -128,7 +130,9 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
     parent_carve, child_carve : Part
         To cut from the two bodies first: ``body - carve + half``.
     spec : DoubleSpec
+        All parameters, defaults filled in.
     plan : DoublePlan
+        Every shape of the hinge as data.
 
     Raises
     ------
@@ -162,7 +166,7 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
         chamfer: float = 0.0,
         margin: float | None = None,
         wall: float | None = None,
-        bore: Literal["round", "teardrop", "octagon"] = "round",
+        bore: BoreStyle = "round",
         up: float = 90.0,
         rotation: RotationLike = (0, 0, 0),
         align: Align | tuple[Align, Align, Align] | None = None,
@@ -188,15 +192,20 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
             up=up,
         )
         plan_double(self.spec)
-        super().__init__(part=self.make_hinge(), rotation=rotation, align=align, mode=mode)
+        super().__init__(part=self._built(), rotation=rotation, align=align, mode=mode)
         self.label = "double hinge"
         self.color = Color(*COLORS["parent"])
         RigidJoint("parent", self, Location())
 
-    def make_hinge(self) -> Part:
-        """Build all three bodies in the drawn pose."""
-        bodies: tuple[Body, ...] = ("parent", "link", "child")
-        return one_part([_piece(self.spec, body).moved(_pose(self.spec, body)) for body in bodies])
+    def _built(self) -> Part:
+        """All three bodies in the drawn pose."""
+        bodies: tuple[BodyName, ...] = ("parent", "link", "child")
+        return one_part(
+            [
+                _piece(_half_plan(self.spec, body), body).moved(_pose(self.spec, body))
+                for body in bodies
+            ]
+        )
 
     @property
     def plan(self) -> DoublePlan:
@@ -250,8 +259,8 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
         Returns
         -------
         parent, link, child : Part
-            With their joints, as on the hinge's own bodies. Rigid and revolute joints that the
-            bodies had are kept.
+            The three bodies with their joints, as on the hinge's own bodies. Rigid and revolute
+            joints that the bodies had are kept.
 
         Raises
         ------
@@ -282,7 +291,7 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
         return made[0], link, made[1]
 
 
-def _add_joints(spec: DoubleSpec, part: Part, body: Body, place: Location) -> None:
+def _add_joints(spec: DoubleSpec, part: Part, body: BodyName, place: Location) -> None:
     """Put the joints of one body on the true axes, in the drawn pose."""
     first, second = spec.angles
     at_link = place * _location(link_pose(spec, first))
@@ -311,7 +320,9 @@ class DoubleHingePart(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     hinge : DoubleHinge
+        The hinge that it is of.
     body : {"parent", "link", "child"}
+        Which of the three bodies it is.
     rotation, align, mode
         As for every build123d part.
     """
@@ -319,13 +330,13 @@ class DoubleHingePart(BasePartObject):  # type: ignore[misc]
     def __init__(
         self,
         hinge: DoubleHinge,
-        body: Body,
+        body: BodyName,
         rotation: RotationLike = (0, 0, 0),
         align: Align | tuple[Align, Align, Align] | None = None,
         mode: Mode = Mode.ADD,
     ) -> None:
         body = _body(body)
-        part = one_part([_piece(hinge.spec, body).moved(_pose(hinge.spec, body))])
+        part = one_part([_piece(_half_plan(hinge.spec, body), body).moved(_pose(hinge.spec, body))])
         super().__init__(part=part, rotation=rotation, align=align, mode=mode)
         self.label = "link" if body == "link" else f"{body} half"
         self.color = Color(*COLORS[body])
@@ -338,7 +349,9 @@ class DoubleHingeCarve(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     hinge : DoubleHinge
+        The hinge that it gives way to.
     body : {"parent", "child"}
+        Which of the two bodies it is for.
     rotation, align, mode
         As for every build123d part; subtracted from the part under construction by default.
     """
@@ -346,7 +359,7 @@ class DoubleHingeCarve(BasePartObject):  # type: ignore[misc]
     def __init__(
         self,
         hinge: DoubleHinge,
-        body: Body,
+        body: BodyName,
         rotation: RotationLike = (0, 0, 0),
         align: Align | tuple[Align, Align, Align] | None = None,
         mode: Mode = Mode.SUBTRACT,
@@ -355,6 +368,6 @@ class DoubleHingeCarve(BasePartObject):  # type: ignore[misc]
         if body == "link":
             raise HingeError("the link is a body of its own: only parent and child are carved")
         pose = _pose(hinge.spec, body)
-        part = one_part([solid.moved(pose) for solid in _carve(hinge.spec, body)])
+        part = one_part([solid.moved(pose) for solid in _carve(_half_plan(hinge.spec, body))])
         super().__init__(part=part, rotation=rotation, align=align, mode=mode)
         self.label = f"{body} carve"

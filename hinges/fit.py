@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from .errors import FitError
+from .exceptions import FitError
 
 __all__ = ["RULES", "at_least", "at_most"]
 
@@ -60,11 +60,11 @@ def at_least(
     what : str
         What was measured, in words.
     value, limit : float
-        In `unit`.
+        What was measured and the least that the rule accepts, in `unit`.
     advice : str
         What to change.
     unit : str
-        "mm", "°", "%" or "" for counts.
+        Unit of both: "mm", "°", "%" or "" for counts.
 
     Raises
     ------
@@ -78,7 +78,20 @@ def at_least(
 def at_most(
     rule: str, what: str, value: float, limit: float, advice: str, unit: str = "mm"
 ) -> None:
-    """Raise if `value` is above `limit`; parameters as for :func:`at_least`.
+    """Raise if `value` is above `limit`.
+
+    Parameters
+    ----------
+    rule : str
+        One of ``RULES``.
+    what : str
+        What was measured, in words.
+    value, limit : float
+        What was measured and the most that the rule accepts, in `unit`.
+    advice : str
+        What to change.
+    unit : str
+        Unit of both: "mm", "°", "%" or "" for counts.
 
     Raises
     ------

@@ -2,55 +2,85 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from .mesh import MeshPart
-from .picture import PALETTE, Body, Camera, render
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["guide_picture", "write_guide"]
+if TYPE_CHECKING:
+    import build123d as bd
+    from fpdf import FPDF
+
+__all__ = ["projected_edges", "write_guide"]
+
+Vector = tuple[float, float, float]
+
+_FROM = (-25.0, -95.0, 110.0)  # where the coupon is seen from, mm
+_WIDTH, _HEIGHT = 174.0, 66.0  # largest size of the drawing on the page, mm
+_CHORD = 0.5  # longest chord of a curve in the drawing, mm of the part
 
 
-def guide_picture(meshes: Sequence[MeshPart], width: int = 1500, height: int = 640) -> bytes:
-    """Draw the coupon from above at an angle.
+def projected_edges(
+    shape: bd.Shape, eye: Vector, up: Vector = (0.0, 0.0, 1.0)
+) -> list[NDArray[np.float64]]:
+    """Draw the visible edges of a part in parallel projection.
 
     Parameters
     ----------
-    meshes : sequence of MeshPart
-        The frame first, then three bodies a clearance.
-    width, height : int
-        In pixels.
+    shape : Shape
+        The part in mm.
+    eye : (float, float, float)
+        Point in mm from which it is seen, looking at the origin.
+    up : (float, float, float)
+        Direction that stands upright in the drawing.
 
     Returns
     -------
-    bytes
-        A PNG.
+    list of (n, 2) float64 array
+        Points along each edge in mm, to the right and upwards from the origin.
     """
-    bodies = [
-        Body(mesh.vertices, mesh.faces, PALETTE[3] if not index else PALETTE[(index - 1) % 3])
-        for index, mesh in enumerate(meshes)
-    ]
-    image = render(bodies, (width, height), Camera(-75.0, 48.0))
-    stream = io.BytesIO()
-    image.quantize(128).save(stream, "PNG", optimize=True)
-    return stream.getvalue()
+    visible, _ = shape.project_to_viewport(eye, up, (0.0, 0.0, 0.0))
+    lines = []
+    for edge in visible:
+        count = 2 if edge.geom_type.name == "LINE" else int(edge.length / _CHORD) + 3
+        points = edge.positions(np.linspace(0.0, 1.0, count).tolist())
+        lines.append(np.array([(point.X, point.Y) for point in points]))
+    return lines
 
 
-def write_guide(
-    path: Path, clearances: Sequence[float], meshes: Sequence[MeshPart], title: str
-) -> None:
+def _draw(pdf: FPDF, lines: Sequence[NDArray[np.float64]]) -> None:
+    """Draw lines across the page, below what is there, and go on below them."""
+    points = np.concatenate(lines)
+    low, high = points.min(axis=0), points.max(axis=0)
+    wide, tall = high - low
+    scale = min(_WIDTH / wide, _HEIGHT / tall)
+    left, top = pdf.l_margin + 0.5 * (_WIDTH - scale * wide), pdf.get_y()
+    pdf.set_line_width(0.12)
+    for line in lines:
+        placed = np.column_stack(
+            [left + scale * (line[:, 0] - low[0]), top + scale * (high[1] - line[:, 1])]
+        )
+        pdf.polyline([(float(x), float(y)) for x, y in placed.round(3)])
+    pdf.set_line_width(0.2)
+    pdf.set_y(top + scale * tall)
+
+
+def write_guide(path: Path, clearances: Sequence[float], columns: bd.Shape, title: str) -> None:
     """Write the one-page PDF.
 
     Parameters
     ----------
     path : Path
+        File to write.
     clearances : sequence of float
-        In mm.
-    meshes : sequence of MeshPart
-        As :attr:`hinges.Coupon.meshes`.
+        Clearances of the coupon in mm.
+    columns : Shape
+        What is drawn: the first columns of the coupon, lying on z = 0.
     title : str
+        Head of the page.
     """
     from fpdf import FPDF
 
@@ -61,8 +91,12 @@ def write_guide(
     pdf.add_page()
     pdf.set_font("Helvetica", "B", 18)
     pdf.cell(0, 10, _plain(title), new_x="LMARGIN", new_y="NEXT")
+    pdf.ln(2)
+    _draw(pdf, projected_edges(columns, _FROM))
     pdf.set_font("Helvetica", "", 10.5)
-    pdf.image(io.BytesIO(guide_picture(meshes)), w=174)
+    pdf.ln(2)
+    caption = "The first columns: hinges with one axis in front of the numbers, with two behind."
+    pdf.cell(0, 6, caption, new_x="LMARGIN", new_y="NEXT", align="C")
     pdf.ln(3)
     steps = [
         "Print it lying as it is, without supports, in the material and with the settings of the "

@@ -1,4 +1,4 @@
-"""Loose pins: filament, rods and screws that a maker puts in after printing."""
+"""Loose pins: filament, rods and screws that are put in after printing."""
 
 from __future__ import annotations
 
@@ -7,29 +7,34 @@ from math import cos, radians
 from typing import Final, Literal
 
 from .clearance import Clearance
-from .errors import HingeError
+from .exceptions import HingeError
 from .fit import at_least
-from .pins import Owned, Pin, Ring, Roof, ring
+from .knuckles import KnuckleLayout
+from .pins import BoreForm, ContactCircle, OwnedShape, Pin, turned_knuckle
 from .shapes import Point, Shape, Turned, cylinder, regular
-from .train import Train
 
 __all__ = ["SCREWS", "FilamentPin", "LoosePin", "RodPin", "Screw", "ScrewPin"]
 
 
 @dataclass(frozen=True)
 class Screw:
-    """Sizes of a metric machine screw and its nut, in mm.
+    """Sizes of a metric machine screw and its nut.
 
     Attributes
     ----------
+    name : str
+        Short name, such as "M3".
+    diameter : float
+        Nominal diameter of the thread in mm.
     clear, tap : float
-        Diameters of the hole that it passes (ISO 273, medium) and that it cuts its thread in.
+        Diameters in mm of the hole that it passes (ISO 273, medium) and of the one that it cuts its
+        thread in.
     cap, cap_height : float
-        Cylinder head, ISO 4762.
+        Diameter and height of the cylinder head in mm, ISO 4762.
     sunk : float
-        Diameter of the 90° countersunk head, ISO 7046.
+        Diameter of the 90° countersunk head in mm, ISO 7046.
     nut, nut_height : float
-        Across the flats, ISO 4032.
+        Size across the flats and height of the nut in mm, ISO 4032.
     """
 
     name: str
@@ -51,32 +56,49 @@ SCREWS: Final[dict[str, Screw]] = {
         Screw("M3", 3.0, 3.4, 2.6, 5.5, 3.0, 5.5, 5.5, 2.4),
     )
 }
-"""The screws that hinges of this size are pinned with."""
+"""The screws that printed hinges are pinned with, by name."""
 
 
-def loose_rings(train: Train, radius: float, room: float) -> tuple[Ring, ...]:
-    """Both ends of the bores of the knuckles that are not the holder's."""
+def loose_pin_contacts(
+    layout: KnuckleLayout, radius: float, room: float
+) -> tuple[ContactCircle, ...]:
+    """Find the ends of the bores that a loose pin is free in.
+
+    Parameters
+    ----------
+    layout : KnuckleLayout
+        The knuckles of the axis.
+    radius : float
+        Radius of the pin in mm.
+    room : float
+        Distance in mm between pin and bore when it leans on the other side.
+
+    Returns
+    -------
+    tuple of ContactCircle
+        Two for each knuckle that is not the pin owner's.
+    """
     return tuple(
-        Ring(z, radius, (1.0, 0.0), room)
-        for span in train.spans
-        if span.owner != train.holder
-        for z in (span.start, span.end)
+        ContactCircle(z, radius, (1.0, 0.0), room)
+        for knuckle in layout.knuckles
+        if knuckle.owner != layout.pin_owner
+        for z in (knuckle.start, knuckle.end)
     )
 
 
 @dataclass(frozen=True)
 class LoosePin(Pin):
-    """A plain round pin pushed through all knuckles: tight in the holder's, free in the others'.
+    """A plain round pin pushed through all knuckles: tight in the pin owner's, free in the others'.
 
     Parameters
     ----------
     diameter : float
-        In mm.
+        Diameter of the pin in mm.
     grip, slip : float
-        Added to the radius of the bore in mm: `grip` in the holder's knuckles, `slip` in the
-        others'.
+        How much wider than the pin the bore is, in mm of its radius: `grip` in the pin owner's
+        knuckles, `slip` in the others'.
     heads : bool
-        Countersink both ends, for a filament whose ends are melted into heads.
+        Whether both ends are countersunk, for a filament whose ends are melted into heads.
     """
 
     diameter: float
@@ -94,81 +116,81 @@ class LoosePin(Pin):
 
     _HEAD = 0.6
 
-    def _bore(self, train: Train, owner: int) -> float:
-        return 0.5 * self.diameter + (self.grip if owner == train.holder else self.slip)
+    def _bore(self, layout: KnuckleLayout, owner: int) -> float:
+        return 0.5 * self.diameter + (self.grip if owner == layout.pin_owner else self.slip)
 
-    def reach(self, train: Train, roof: Roof) -> float:
+    def largest_radius(self, layout: KnuckleLayout, bore_form: BoreForm) -> float:
         """Largest radius in mm that the pin takes out of a barrel."""
-        wide = (0.5 * self.diameter + self.slip) * roof.factor
+        wide = (0.5 * self.diameter + self.slip) * bore_form.factor
         return max(wide, 0.5 * self.diameter + self.slip + self._HEAD) if self.heads else wide
 
     def thinnest_barrel(self, clearance: Clearance, wall: float, knuckles: int) -> float:
         """Smallest barrel radius in mm that leaves `wall` around a teardrop bore."""
         del clearance, knuckles
-        wide = (0.5 * self.diameter + self.slip) * Roof("teardrop").factor
+        wide = (0.5 * self.diameter + self.slip) * BoreForm("teardrop").factor
         return max(wide, 0.5 * self.diameter + self.slip + self._HEAD * self.heads) + wall
 
-    def check(self, train: Train, wall: float, roof: Roof) -> None:
-        """Refuse a train that this pin cannot hold.
+    def check(self, layout: KnuckleLayout, wall: float, bore_form: BoreForm) -> None:
+        """Refuse a layout that this pin cannot hold.
 
         Raises
         ------
         FitError
             If a wall is too thin or the child can slide off.
         """
-        self._check_common(train, wall, roof)
+        self._check_common(layout, wall, bore_form)
         if not self.heads:
             at_least(
                 "retention",
                 "the number of knuckles on a plain loose pin",
-                len(train.spans),
+                len(layout.knuckles),
                 3,
                 "use 3 knuckles or more, heads=True, or a screw",
                 "",
             )
 
-    def knuckles(self, train: Train, chamfer: float) -> tuple[Owned, ...]:
+    def knuckle_shapes(self, layout: KnuckleLayout, chamfer: float) -> tuple[OwnedShape, ...]:
         """Turn every knuckle with its round bore."""
-        made: list[Owned] = []
-        last = len(train.spans) - 1
-        for index, span in enumerate(train.spans):
-            bore = self._bore(train, span.owner)
+        made: list[OwnedShape] = []
+        last = len(layout.knuckles) - 1
+        for index, knuckle in enumerate(layout.knuckles):
+            bore = self._bore(layout, knuckle.owner)
             ends: list[list[Point]] = []
             for outer, face, inward in (
-                (index == 0, span.start, 1.0),
-                (index == last, span.end, -1.0),
+                (index == 0, knuckle.start, 1.0),
+                (index == last, knuckle.end, -1.0),
             ):
                 if outer and self.heads:
                     ends.append([(bore, face + inward * self._HEAD), (bore + self._HEAD, face)])
                 else:
                     ends.append([(bore, face)])
-            made.append((span.owner, ring(train, span, chamfer, *ends)))
+            made.append((knuckle.owner, turned_knuckle(layout, knuckle, chamfer, *ends)))
         return tuple(made)
 
-    def bores(self, train: Train, roof: Roof) -> tuple[Owned, ...]:
+    def bore_cuts(self, layout: KnuckleLayout, bore_form: BoreForm) -> tuple[OwnedShape, ...]:
         """Give the roofs over the bores."""
         return tuple(
-            (span.owner, over)
-            for span in train.spans
-            for over in roof.over(self._bore(train, span.owner), span)
+            (knuckle.owner, over)
+            for knuckle in layout.knuckles
+            for over in bore_form.roof(self._bore(layout, knuckle.owner), knuckle)
         )
 
-    def access(self, train: Train, edge: float) -> tuple[Shape, ...]:
-        """Clear both bodies from the ends of the train to the ends of the edge."""
+    def insertion_cuts(self, layout: KnuckleLayout, edge: float) -> tuple[Shape, ...]:
+        """Clear both bodies from the ends of the layout to the ends of the edge."""
         wide = 0.5 * self.diameter + self.slip + (self._HEAD if self.heads else 0.0)
         return tuple(
             cylinder(wide, *sorted(ends))
-            for ends in ((train.start, -edge), (train.end, edge))
+            for ends in ((layout.start, -edge), (layout.end, edge))
             if abs(ends[1] - ends[0]) > 1e-6
         )
 
-    def rings(self, train: Train) -> tuple[Ring, ...]:
+    def contact_circles(self, layout: KnuckleLayout) -> tuple[ContactCircle, ...]:
         """Both ends of every bore; the pin's room on both sides counts."""
-        return loose_rings(train, 0.5 * self.diameter, self.grip + self.slip)
+        return loose_pin_contacts(layout, 0.5 * self.diameter, self.grip + self.slip)
 
-    def hardware(self, train: Train) -> tuple[Shape, ...]:
+    def hardware(self, layout: KnuckleLayout) -> tuple[Shape, ...]:
         """Draw the pin."""
-        return (cylinder(0.5 * self.diameter, train.start, train.end),)
+        return (cylinder(0.5 * self.diameter, layout.start, layout.end),)
 
 
 @dataclass(frozen=True)
@@ -178,7 +200,7 @@ class FilamentPin(LoosePin):
     Parameters
     ----------
     diameter : float
-        1.75 or 2.85 mm.
+        Diameter of the filament: 1.75 or 2.85 mm.
     grip, slip, heads
         As for :class:`LoosePin`.
     """
@@ -201,7 +223,7 @@ class RodPin(LoosePin):
     Parameters
     ----------
     diameter : float
-        In mm.
+        Diameter of the rod in mm.
     grip, slip, heads
         As for :class:`LoosePin`.
     """
@@ -218,11 +240,13 @@ class ScrewPin(Pin):
     Parameters
     ----------
     size : {"M2", "M2.5", "M3"}
+        Nominal thread of the screw.
     head : {"cylinder", "countersunk"}
+        Form of its head.
     end : {"nut", "tap"}
-        A nut, or the thread that the screw cuts itself in the last knuckle.
+        What holds it: a nut, or the thread that the screw cuts itself in the last knuckle.
     sunk : bool
-        Sink head and nut in pockets of the barrel; otherwise they stand outside its ends.
+        Whether head and nut lie in pockets of the barrel; otherwise they stand outside its ends.
     """
 
     size: str = "M3"
@@ -261,32 +285,32 @@ class ScrewPin(Pin):
         nut = self._nut_radius if self.end == "nut" else 0.0
         return max(0.5 * wide + self._ROOM, nut)
 
-    def reach(self, train: Train, roof: Roof) -> float:
+    def largest_radius(self, layout: KnuckleLayout, bore_form: BoreForm) -> float:
         """Largest radius in mm that the pin takes out of a barrel."""
-        del train
-        return max(0.5 * self.screw.clear * roof.factor, self._pocket())
+        del layout
+        return max(0.5 * self.screw.clear * bore_form.factor, self._pocket())
 
     def thinnest_barrel(self, clearance: Clearance, wall: float, knuckles: int) -> float:
         """Smallest barrel radius in mm that leaves `wall` around bores and pockets."""
         del clearance, knuckles
-        wide = 0.5 * self.screw.clear * Roof("teardrop").factor
+        wide = 0.5 * self.screw.clear * BoreForm("teardrop").factor
         return max(wide, self._pocket()) + wall
 
-    def check(self, train: Train, wall: float, roof: Roof) -> None:
-        """Refuse a train that this screw cannot hold.
+    def check(self, layout: KnuckleLayout, wall: float, bore_form: BoreForm) -> None:
+        """Refuse a layout that this screw cannot hold.
 
         Raises
         ------
         FitError
             If a wall is too thin, or a pocket too deep for its knuckle.
         """
-        self._check_common(train, wall, roof)
+        self._check_common(layout, wall, bore_form)
         deep = max(self._head_depth(), self.screw.nut_height if self.end == "nut" else 0.0)
         if self.sunk:
             at_least(
                 "web",
                 "the material behind the pocket of head or nut",
-                min(train.spans[0].length, train.spans[-1].length) - deep,
+                min(layout.knuckles[0].length, layout.knuckles[-1].length) - deep,
                 wall,
                 "use fewer knuckles, a longer edge, a smaller screw or sunk=False",
             )
@@ -294,7 +318,7 @@ class ScrewPin(Pin):
             at_least(
                 "knuckle",
                 f"the length of thread in the last knuckle for {self.size}",
-                train.spans[-1].length,
+                layout.knuckles[-1].length,
                 1.5 * self.screw.diameter,
                 "use fewer knuckles, a longer edge, or a nut",
             )
@@ -305,46 +329,54 @@ class ScrewPin(Pin):
             return screw.cap_height
         return 0.5 * (screw.sunk - screw.clear) + self._ROOM
 
-    def knuckles(self, train: Train, chamfer: float) -> tuple[Owned, ...]:
+    def knuckle_shapes(self, layout: KnuckleLayout, chamfer: float) -> tuple[OwnedShape, ...]:
         """Turn every knuckle with its bore and the pocket of the head."""
-        made: list[Owned] = []
-        last = len(train.spans) - 1
+        made: list[OwnedShape] = []
+        last = len(layout.knuckles) - 1
         clear = 0.5 * self.screw.clear
-        for index, span in enumerate(train.spans):
+        for index, knuckle in enumerate(layout.knuckles):
             bore = 0.5 * self.screw.tap if index == last and self.end == "tap" else clear
-            start: list[Point] = [(bore, span.start)]
+            start: list[Point] = [(bore, knuckle.start)]
             if index == 0 and self.sunk:
-                foot = span.start + self._head_depth()
+                foot = knuckle.start + self._head_depth()
                 wide = 0.5 * self.screw.cap + self._ROOM
-                start = [(bore, foot), (wide, foot), (wide, span.start)]
+                start = [(bore, foot), (wide, foot), (wide, knuckle.start)]
                 if self.head == "countersunk":
                     wide = 0.5 * self.screw.sunk + self._ROOM
-                    start = [(bore, span.start + wide - bore), (wide, span.start)]
-            made.append((span.owner, ring(train, span, chamfer, start, [(bore, span.end)])))
+                    start = [(bore, knuckle.start + wide - bore), (wide, knuckle.start)]
+            made.append(
+                (
+                    knuckle.owner,
+                    turned_knuckle(layout, knuckle, chamfer, start, [(bore, knuckle.end)]),
+                )
+            )
         return tuple(made)
 
-    def bores(self, train: Train, roof: Roof) -> tuple[Owned, ...]:
+    def bore_cuts(self, layout: KnuckleLayout, bore_form: BoreForm) -> tuple[OwnedShape, ...]:
         """Give the roofs over the bores and the pocket of the nut."""
-        made: list[Owned] = []
-        last = len(train.spans) - 1
-        for index, span in enumerate(train.spans):
+        made: list[OwnedShape] = []
+        last = len(layout.knuckles) - 1
+        for index, knuckle in enumerate(layout.knuckles):
             if index < last or self.end == "nut":
-                made += [(span.owner, over) for over in roof.over(0.5 * self.screw.clear, span)]
+                made += [
+                    (knuckle.owner, over)
+                    for over in bore_form.roof(0.5 * self.screw.clear, knuckle)
+                ]
         if self.sunk and self.end == "nut":
-            span = train.spans[-1]
+            knuckle = layout.knuckles[-1]
             flats = self.screw.nut + 2.0 * self._ROOM
-            foot = span.end - self.screw.nut_height
-            first = roof.up[span.owner]
-            made.append((span.owner, regular(6, flats, foot, span.end + 0.01, first)))
+            foot = knuckle.end - self.screw.nut_height
+            first = bore_form.up[knuckle.owner]
+            made.append((knuckle.owner, regular(6, flats, foot, knuckle.end + 0.01, first)))
         return tuple(made)
 
-    def access(self, train: Train, edge: float) -> tuple[Shape, ...]:
+    def insertion_cuts(self, layout: KnuckleLayout, edge: float) -> tuple[Shape, ...]:
         """Clear both bodies for the head, and for the nut at the other end."""
         wide = 0.5 * (self.screw.cap if self.head == "cylinder" else self.screw.sunk) + self._ROOM
-        ends = [(wide, train.start, -max(edge, -train.start + self._proud(head=True)))]
+        ends = [(wide, layout.start, -max(edge, -layout.start + self._proud(head=True)))]
         if self.end == "nut":
-            far = max(edge, train.end + self._proud(head=False))
-            ends.append((self._nut_radius, train.end, far))
+            far = max(edge, layout.end + self._proud(head=False))
+            ends.append((self._nut_radius, layout.end, far))
         return tuple(
             cylinder(radius, *sorted((near, far)))
             for radius, near, far in ends
@@ -356,21 +388,21 @@ class ScrewPin(Pin):
             return 0.0
         return (self.screw.cap_height if head else self.screw.nut_height) + self._ROOM
 
-    def rings(self, train: Train) -> tuple[Ring, ...]:
+    def contact_circles(self, layout: KnuckleLayout) -> tuple[ContactCircle, ...]:
         """Both ends of every bore; the screw's room on both sides counts."""
         radius = 0.5 * self.screw.diameter
-        return loose_rings(train, radius, 2.0 * (0.5 * self.screw.clear - radius))
+        return loose_pin_contacts(layout, radius, 2.0 * (0.5 * self.screw.clear - radius))
 
-    def hardware(self, train: Train) -> tuple[Shape, ...]:
+    def hardware(self, layout: KnuckleLayout) -> tuple[Shape, ...]:
         """Draw the screw, and its nut."""
         screw = self.screw
         radius = 0.5 * screw.diameter
-        base = train.start
+        base = layout.start
         # Where the screw cuts its own thread only its core is drawn.
-        thread = train.spans[-1].start
+        thread = layout.knuckles[-1].start
         core = 0.5 * screw.tap if self.end == "tap" else radius
         shank: tuple[Point, ...] = ((radius, thread), (core, thread)) if core < radius else ()
-        shank = (*shank, (core, train.end), (0.0, train.end))
+        shank = (*shank, (core, layout.end), (0.0, layout.end))
         if self.head == "countersunk":
             slope = 0.5 * screw.sunk
             head: tuple[Point, ...] = (
@@ -386,6 +418,6 @@ class ScrewPin(Pin):
         outline = (*head, *shank)
         drawn: list[Shape] = [Turned(outline)]
         if self.end == "nut":
-            start = train.end - (screw.nut_height if self.sunk else 0.0)
+            start = layout.end - (screw.nut_height if self.sunk else 0.0)
             drawn.append(regular(6, screw.nut, start, start + screw.nut_height, 0.0))
         return tuple(drawn)

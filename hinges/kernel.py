@@ -10,7 +10,7 @@ from __future__ import annotations
 from importlib import metadata
 from importlib.util import find_spec
 
-from .errors import KernelError
+from .exceptions import KernelError
 
 __all__ = ["check_kernel"]
 
@@ -37,7 +37,7 @@ def check_kernel(*, cadquery: bool = False) -> None:
     Parameters
     ----------
     cadquery : bool
-        Whether CadQuery is wanted too.
+        Whether CadQuery is needed too.
 
     Raises
     ------

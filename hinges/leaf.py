@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .errors import HingeError
+from .exceptions import HingeError
 from .fit import at_least
+from .knuckles import KnuckleLayout
 from .shapes import Moved, Prism, Shape, Turned, box
-from .train import Train
 
 __all__ = ["Bracket", "Leaf"]
 
@@ -19,57 +19,110 @@ class Bracket:
     Parameters
     ----------
     width : float, optional
-        From the axis into the body across the shared face, in mm. The groove of the other half's
-        knuckles and 1.2 mm of material behind it when left out.
+        Distance in mm from the axis into the body, across the shared face. When left out the groove
+        of the other half's knuckles and 1.2 mm of material behind it.
     depth : float, optional
-        From the axis into the body along the shared face, in mm; `width` when left out.
+        Distance in mm from the axis into the body, along the shared face; `width` when left out.
     gusset : bool
-        Slope the bar's lower side at 45° down to the shared face, so that it prints without support
-        inside a wall thinner than itself, in a body that stands with y up.
+        Whether the bar's lower side slopes at 45° down to the shared face, so that it prints
+        without support inside a wall thinner than itself, in a body that stands with y up.
     """
 
     width: float | None = None
     depth: float | None = None
     gusset: bool = False
 
-    def limits(self, train: Train, gap: float) -> tuple[float, float, float, float]:
-        """Near and far limit across the face, near and far limit along it, in mm."""
-        width = train.reach + 1.2 if self.width is None else self.width
+    def limits(self, layout: KnuckleLayout, gap: float) -> tuple[float, float, float, float]:
+        """Find where the web lies.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        gap : float
+            Distance between the two bodies in mm.
+
+        Returns
+        -------
+        near, far, top, bottom : float
+            Distances from the axis in mm: of its two ends across the shared face, and of its upper
+            and lower face along it.
+        """
+        width = layout.groove_radius + 1.2 if self.width is None else self.width
         depth = width if self.depth is None else self.depth
         return 0.5 * gap, width, 0.5 * gap, depth
 
-    def check(self, train: Train, gap: float, wall: float) -> None:
+    def check(self, layout: KnuckleLayout, gap: float, wall: float) -> None:
         """Refuse a bar that the groove would cut through.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        gap : float
+            Distance between the two bodies in mm.
+        wall : float
+            Thinnest wall in mm.
 
         Raises
         ------
         FitError
-            If less than `wall` (mm) of it stays behind the groove, either way.
+            If less than a wall of it stays behind the groove, either way.
         """
-        _, width, _, depth = self.limits(train, gap)
+        _, width, _, depth = self.limits(layout, gap)
         at_least(
             "bracket",
             "the bracket's material behind the groove",
-            min(width, depth) - train.reach,
+            min(width, depth) - layout.groove_radius,
             wall,
             "use a wider and deeper bracket or a smaller barrel",
         )
 
-    def web(self, train: Train, gap: float, side: float) -> tuple[Shape, ...]:
-        """Draw the bar on one side: -1 parent, +1 child."""
-        near, far, top, bottom = self.limits(train, gap)
+    def web(self, layout: KnuckleLayout, gap: float, side: float) -> tuple[Shape, ...]:
+        """Draw the bar of one half.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        gap : float
+            Distance between the two bodies in mm.
+        side : float
+            -1 for the parent's half, 1 for the child's.
+
+        Returns
+        -------
+        tuple of Shape
+            What joins the knuckles of the half, in mm.
+        """
+        near, far, top, bottom = self.limits(layout, gap)
         west, east = sorted((side * near, side * far))
         if not self.gusset:
-            return (box(west, east, -bottom, -top, train.start, train.end),)
+            return (box(west, east, -bottom, -top, layout.start, layout.end),)
         low = -bottom - (far - near)
         corners = [(near, low), (far, -bottom), (far, -top), (near, -top)]
         if side < 0.0:
             corners = [(-x, y) for x, y in reversed(corners)]
-        return (Prism(tuple(corners), train.start, train.end),)
+        return (Prism(tuple(corners), layout.start, layout.end),)
 
-    def drilled(self, train: Train, gap: float, side: float) -> tuple[Shape, ...]:
-        """Give what is cut through it: nothing."""
-        del train, gap, side
+    def hole_cuts(self, layout: KnuckleLayout, gap: float, side: float) -> tuple[Shape, ...]:
+        """Plan what is cut through the web.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        gap : float
+            Distance between the two bodies in mm.
+        side : float
+            -1 for the parent's half, 1 for the child's.
+
+        Returns
+        -------
+        tuple of Shape
+            Nothing for a bracket.
+        """
+        del layout, gap, side
         return ()
 
 
@@ -80,21 +133,21 @@ class Leaf:
     Parameters
     ----------
     width : float
-        From the axis to the far edge in mm.
+        Distance from the axis to the far edge in mm.
     thickness : float
-        In mm.
+        Thickness of the plate in mm.
     offset : float, optional
-        From the axis down to the plate's upper face in mm; so that plate and barrel end at one
-        level below when left out.
+        Distance from the axis down to the plate's upper face in mm. When left out, plate and barrel
+        end at one level below.
     holes : int
-        Screw holes in a row along the middle of the free part of the plate.
+        Number of screw holes in a row along the middle of the free part of the plate.
     hole : float
-        Their diameter in mm.
+        Diameter of the holes in mm.
     sink : float
         Diameter of a 90° countersink on the upper face in mm; 0 for none.
     flat : bool
-        Cut the barrels flat below, where they would overhang by more than 45°, and lay the plate's
-        lower face in that plane: a hinge to print lying, without support.
+        Whether the barrels are cut flat below, where they would overhang by more than 45°, with the
+        plate's lower face in that plane: a hinge to print lying, without support.
     """
 
     width: float
@@ -105,14 +158,23 @@ class Leaf:
     sink: float = 0.0
     flat: bool = False
 
-    def limits(self, train: Train, gap: float) -> tuple[float, float, float, float]:
-        """Near and far limit across the face, near and far limit along it, in mm."""
-        level = train.radius * (0.5**0.5 if self.flat else 1.0)
+    def limits(self, layout: KnuckleLayout, gap: float) -> tuple[float, float, float, float]:
+        """Find where the plate lies, as :meth:`Bracket.limits` does."""
+        level = layout.radius * (0.5**0.5 if self.flat else 1.0)
         top = max(0.5 * gap, level - self.thickness) if self.offset is None else self.offset
         return 0.5 * gap, self.width, top, top + self.thickness
 
-    def check(self, train: Train, gap: float, wall: float) -> None:
+    def check(self, layout: KnuckleLayout, gap: float, wall: float) -> None:
         """Refuse a plate too thin, too narrow for its holes, or not joined to its barrel.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        gap : float
+            Distance between the two bodies in mm.
+        wall : float
+            Thinnest wall in mm.
 
         Raises
         ------
@@ -121,7 +183,7 @@ class Leaf:
         HingeError
             If hole sizes make no sense.
         """
-        _, _, top, bottom = self.limits(train, gap)
+        _, _, top, bottom = self.limits(layout, gap)
         at_least("bracket", "the thickness of the leaf", self.thickness, wall, "use a thicker leaf")
         at_least(
             "bracket",
@@ -133,14 +195,14 @@ class Leaf:
         at_least(
             "bracket",
             "the thickness of leaf that meets the barrel",
-            min(bottom, train.radius) - top,
+            min(bottom, layout.radius) - top,
             wall,
             "use a smaller offset",
         )
         at_least(
             "bracket",
             "the leaf's material behind the groove",
-            self.width - train.reach,
+            self.width - layout.groove_radius,
             2.0 * wall,
             "use a wider leaf or a smaller barrel",
         )
@@ -154,14 +216,14 @@ class Leaf:
             at_least(
                 "bracket",
                 "the leaf beside a screw hole",
-                0.5 * (self.width - train.reach - wide),
+                0.5 * (self.width - layout.groove_radius - wide),
                 wall,
                 "use a wider leaf or smaller holes",
             )
             at_least(
                 "bracket",
                 "the leaf between two screw holes",
-                (train.end - train.start) / self.holes - wide,
+                (layout.end - layout.start) / self.holes - wide,
                 wall,
                 "use fewer or smaller holes",
             )
@@ -173,32 +235,32 @@ class Leaf:
                 "use a thicker leaf or a smaller countersink",
             )
 
-    def web(self, train: Train, gap: float, side: float) -> tuple[Shape, ...]:
-        """Draw the plate on one side: -1 parent, +1 child."""
-        near, far, top, bottom = self.limits(train, gap)
+    def web(self, layout: KnuckleLayout, gap: float, side: float) -> tuple[Shape, ...]:
+        """Draw the plate of one half, as :meth:`Bracket.web` does its bar."""
+        near, far, top, bottom = self.limits(layout, gap)
         west, east = sorted((side * near, side * far))
-        return (box(west, east, -bottom, -top, train.start, train.end),)
+        return (box(west, east, -bottom, -top, layout.start, layout.end),)
 
-    def drilled(self, train: Train, gap: float, side: float) -> tuple[Shape, ...]:
-        """Give the screw holes, drilled from the upper face, and what lies below a flat foot."""
-        _, far, top, bottom = self.limits(train, gap)
+    def hole_cuts(self, layout: KnuckleLayout, gap: float, side: float) -> tuple[Shape, ...]:
+        """Plan the screw holes, drilled from the upper face, and what lies below a flat foot."""
+        _, far, top, bottom = self.limits(layout, gap)
         foot: tuple[Shape, ...] = ()
         if self.flat:
-            level, wide = max(bottom, train.radius * 0.5**0.5), 1.1 * train.radius
-            deep = max(level, train.radius) + 1.0
-            foot = (box(-wide, wide, -deep, -level, train.start - 1.0, train.end + 1.0),)
-        middle = 0.5 * side * (train.reach + far)
+            level, wide = max(bottom, layout.radius * 0.5**0.5), 1.1 * layout.radius
+            deep = max(level, layout.radius) + 1.0
+            foot = (box(-wide, wide, -deep, -level, layout.start - 1.0, layout.end + 1.0),)
+        middle = 0.5 * side * (layout.groove_radius + far)
         radius, over = 0.5 * self.hole, 0.01
         deep = bottom - top + over
         outline = [(0.0, -over), (radius, -over), (radius, deep), (0.0, deep)]
         if self.sink > 0.0:
             wide = 0.5 * self.sink
             outline[1:2] = [(wide + over, -over), (radius, wide - radius)]
-        pitch = (train.end - train.start) / max(self.holes, 1)
+        pitch = (layout.end - layout.start) / max(self.holes, 1)
         drilled = tuple(
             Moved(
                 Turned(tuple(outline)),
-                (middle, -top, train.start + (index + 0.5) * pitch),
+                (middle, -top, layout.start + (index + 0.5) * pitch),
                 (0.0, -1.0, 0.0),
                 (1.0, 0.0, 0.0),
             )

@@ -1,21 +1,7 @@
 """Hinges as triangle meshes, ready for mesh booleans.
 
-.. code-block:: text
-
-    single_hinge_meshes(
-        voxel_mm, clearance_mm, *, barrel_radius_mm=None, pin_radius_mm=None, knuckles=3,
-        gap_mm=None, bracket_mm=None, margin_mm=None, wall_mm=0.8, segments=64,
-    ) -> HingeMeshes(parent_half, child_half, parent_carve, child_carve,
-                     barrel_radius_mm, pin_radius_mm, knuckles, reach_mm)
-
-    double_hinge_meshes(
-        voxel_mm, clearance_mm, first="+y", second="-y", turns=(180, 180), *,
-        barrel_radius_mm=None, pin_radius_mm=None, knuckles=None, plate_mm=None,
-        gap_mm=None, bracket_mm=None, margin_mm=None, wall_mm=0.8, segments=64,
-    ) -> DoubleHingeMeshes(parent_half, link, child_half, parent_carve, child_carve, plate,
-                           barrel_radius_mm, pin_radius_mm, knuckles, reach_mm, plate_mm)
-
-    each piece: MeshPart(vertices (v, 3) float64 in mm, faces (f, 3) int32)
+A :class:`MeshPart` holds vertices in mm and triangles. :func:`single_hinge_meshes` gives the four
+pieces of a single hinge, :func:`double_hinge_meshes` the five of a double one.
 
 Use it as ``body - carve + half`` on each of the two bodies, in that order; nothing needs to be
 subtracted after.
@@ -41,19 +27,22 @@ one and at most 0.0024 (r + c) above it for 64 segments (0.007 mm at r + c = 2.8
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from math import cos, pi
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .barrel import default_pin_radius, default_radii
 from .clearance import Clearance
 from .leaf import Bracket
+from .options import BarrelKeywords
 from .pins import ConePin
-from .plan import HalfPlan, SingleSpec, default_pin_radius, default_radii, plan_single
 from .plan_double import DoubleSpec, plan_double, plate_shape
-from .shapes import Moved, Prism, Shape
+from .plan_single import SingleSpec, plan_single
+from .shapes import HalfPlan, Moved, Prism, Shape
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -61,12 +50,14 @@ if TYPE_CHECKING:
 __all__ = [
     "DoubleHingeMeshes",
     "HingeMeshes",
+    "MeshKeywords",
+    "MeshOptions",
     "MeshPart",
     "double_hinge_meshes",
-    "half_of",
-    "part_of",
+    "half_manifolds",
+    "manifold_of",
+    "mesh_part",
     "single_hinge_meshes",
-    "solid_of",
 ]
 
 
@@ -76,8 +67,9 @@ class MeshPart(NamedTuple):
     Attributes
     ----------
     vertices : (v, 3) float64 array
-        In mm.
+        Corners in mm.
     faces : (f, 3) int32 array
+        Three corners of each triangle, counter-clockwise as seen from outside.
     """
 
     vertices: NDArray[np.float64]
@@ -97,10 +89,14 @@ class HingeMeshes(NamedTuple):
         To add to each body after its carve was subtracted. One connected piece each.
     parent_carve, child_carve : MeshPart
         To subtract from each body first.
-    barrel_radius_mm, pin_radius_mm : float
+    barrel_radius_mm : float
+        Radius of the barrels in mm.
+    pin_radius_mm : float
+        Radius at the foot of the cone pins in mm.
     knuckles : int
+        Number of knuckles.
     reach_mm : float
-        Radius of the groove that a barrel needs in any other body: barrel plus clearance.
+        Radius in mm of the groove that a barrel needs in any other body: barrel plus clearance.
     """
 
     parent_half: MeshPart
@@ -114,7 +110,7 @@ class HingeMeshes(NamedTuple):
 
 
 class DoubleHingeMeshes(NamedTuple):
-    """The five pieces of one double hinge, and the sizes that were used.
+    """The pieces of one double hinge, and the sizes that were used.
 
     Attributes
     ----------
@@ -127,13 +123,16 @@ class DoubleHingeMeshes(NamedTuple):
     plate : MeshPart
         The link plate alone, without knuckles and grooves. Along edges without an axis it keeps the
         margin free, so that another hinge's barrel on such an edge does not meet it.
-    barrel_radius_mm, pin_radius_mm : float
+    barrel_radius_mm : float
+        Radius of the barrels in mm.
+    pin_radius_mm : float
+        Radius at the foot of the cone pins in mm.
     knuckles : int
-        On each axis; of both together when they share an edge.
+        Number of knuckles on each axis; of both together when they share an edge.
     reach_mm : float
-        Radius of the groove that a barrel needs in any other body.
+        Radius in mm of the groove that a barrel needs in any other body: barrel plus clearance.
     plate_mm : float
-        Thickness of the link plate.
+        Thickness of the link plate in mm.
     """
 
     parent_half: MeshPart
@@ -149,7 +148,54 @@ class DoubleHingeMeshes(NamedTuple):
     plate_mm: float
 
 
-def solid_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
+class MeshKeywords(TypedDict, total=False):
+    """Keywords that :func:`single_hinge_meshes` and :func:`double_hinge_meshes` share."""
+
+    barrel_radius_mm: float | None
+    pin_radius_mm: float | None
+    gap_mm: float | None
+    bracket_mm: float | None
+    margin_mm: float | None
+    wall_mm: float
+    segments: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshOptions:
+    """Sizes of a hinge's meshes; None stands for one that follows from the others.
+
+    Attributes
+    ----------
+    barrel_radius_mm : float, optional
+        Radius of the barrels in mm; :func:`hinges.barrel.default_radii` chooses it when left out.
+    pin_radius_mm : float, optional
+        Radius at the foot of the cone pins in mm; 60 % of the barrel, or as much as the wall
+        leaves, when left out.
+    gap_mm : float, optional
+        Distance between the two bodies in mm; each is inset by half of it. The clearance when left
+        out.
+    bracket_mm : float, optional
+        Width and depth in mm of the square web that joins the knuckles of a half, measured from the
+        axis. When left out the groove and 1.2 mm of material behind it, or 0.15 of the voxel when
+        that is more.
+    margin_mm : float, optional
+        Length in mm left free at each end of the edge; barrel radius plus clearance when left out.
+    wall_mm : float
+        Thinnest wall in mm.
+    segments : int
+        Number of corners of a full circle.
+    """
+
+    barrel_radius_mm: float | None = None
+    pin_radius_mm: float | None = None
+    gap_mm: float | None = None
+    bracket_mm: float | None = None
+    margin_mm: float | None = None
+    wall_mm: float = 0.8
+    segments: int = 64
+
+
+def manifold_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
     """Turn a shape into a manifold that never takes room from a clearance.
 
     A round face that looks outwards lies inside the true circle when the shape is added and
@@ -157,17 +203,23 @@ def solid_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
 
     Parameters
     ----------
-    shape : Turned or Prism
+    shape : Turned, Prism or Moved
+        What to build, in mm.
     segments : int
-        Corners of a full circle.
+        Number of corners of a full circle.
     outside : bool
         True for what is cut away, False for what is added.
+
+    Returns
+    -------
+    Manifold
+        The shape in mm.
     """
     from manifold3d import CrossSection, FillRule, Manifold
 
     if isinstance(shape, Moved):
         frame = np.column_stack((shape.x_dir, shape.y_dir, shape.z_dir, shape.origin))
-        return solid_of(shape.shape, segments, outside=outside).transform(frame)
+        return manifold_of(shape.shape, segments, outside=outside).transform(frame)
     if isinstance(shape, Prism):
         rims = [list(shape.outline), *(list(hole) for hole in shape.holes)]
         section = CrossSection(rims, FillRule.EvenOdd)
@@ -186,23 +238,25 @@ def solid_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
     return part.rotate((0.0, 0.0, shape.begin))
 
 
-def half_of(plan: HalfPlan, segments: int) -> tuple[Manifold, Manifold]:
+def half_manifolds(plan: HalfPlan, segments: int) -> tuple[Manifold, Manifold]:
     """Build a half and its carve from their plan.
 
     Parameters
     ----------
     plan : HalfPlan
+        Shapes of the half.
     segments : int
-        Corners of a full circle.
+        Number of corners of a full circle.
 
     Returns
     -------
     half, carve : Manifold
+        What to add to the body, and what to cut from it first, in mm.
     """
     from manifold3d import Manifold, OpType
 
     def united(shapes: tuple[Shape, ...], outside: bool) -> Manifold:
-        built = [solid_of(shape, segments, outside=outside) for shape in shapes]
+        built = [manifold_of(shape, segments, outside=outside) for shape in shapes]
         return Manifold.batch_boolean(built, OpType.Add) if len(built) > 1 else built[0]
 
     carve = united(plan.carve, True)
@@ -221,50 +275,61 @@ def _without_slivers(solid: Manifold) -> Manifold:
     return solid if len(kept) == len(parts) else Manifold.compose(kept)
 
 
-def part_of(solid: Manifold) -> MeshPart:
-    """Read a manifold's triangles into arrays."""
+def mesh_part(solid: Manifold) -> MeshPart:
+    """Read a manifold's triangles into arrays.
+
+    Parameters
+    ----------
+    solid : Manifold
+        The solid in mm.
+
+    Returns
+    -------
+    MeshPart
+        Its corners and triangles.
+    """
     mesh = solid.to_mesh64()
     vertices = np.array(mesh.vert_properties, dtype=np.float64)[:, :3].copy()
     faces = np.array(mesh.tri_verts, dtype=np.int32)
     return MeshPart(vertices, faces)
 
 
-def single_hinge_meshes(voxel_mm: float, clearance_mm: float, **options: Any) -> HingeMeshes:
+def single_hinge_meshes(
+    voxel_mm: float, clearance_mm: float, *, knuckles: int = 3, **options: Unpack[MeshKeywords]
+) -> HingeMeshes:
     """Build the four pieces of a cone-pinned single hinge for the edge of a voxel.
 
     Parameters
     ----------
     voxel_mm : float
-        Length of the edge.
+        Length of the edge in mm.
     clearance_mm : float
-        Normal clearance in the hinge.
-    barrel_radius_mm, pin_radius_mm : float, optional
-        Chosen by :func:`default_radii` when left out.
+        Normal clearance in the hinge in mm.
     knuckles : int
-        3 by default; the parent has the odd one.
-    gap_mm : float, optional
-        Between the two bodies; each is inset by half of it. `clearance_mm` when left out.
-    bracket_mm : float, optional
-        Width and depth of the square web that joins the knuckles of a half, measured from the
-        axis. At least the groove and 1.2 mm of material behind it; 0.15 voxel when that is more.
-    margin_mm : float, optional
-        Left free at both ends of the edge; barrel radius plus clearance when left out.
-    wall_mm : float
-        Thinnest wall.
-    segments : int
-        Corners of a full circle.
+        Number of knuckles; with an odd count the parent has one more than the child.
+    **options
+        Sizes that :class:`MeshOptions` names.
 
     Returns
     -------
     HingeMeshes
-        The work is cached by the arguments; the arrays are the caller's own copies.
+        The pieces and the sizes that were used. The work is cached by the arguments; the arrays
+        are the caller's own copies.
 
     Raises
     ------
     FitError
         If the hinge cannot be printed at this size, naming the rule and what to change.
+    HingeError
+        If a size makes no sense.
+
+    Examples
+    --------
+    >>> pieces = single_hinge_meshes(20, 0.3)
+    >>> pieces.barrel_radius_mm, pieces.pin_radius_mm
+    (2.5, 1.5)
     """
-    made = _single(float(voxel_mm), float(clearance_mm), **options)
+    made = _single(float(voxel_mm), float(clearance_mm), knuckles, MeshOptions(**options))
     return made._replace(
         parent_half=made.parent_half.copied(),
         child_half=made.child_half.copied(),
@@ -273,50 +338,60 @@ def single_hinge_meshes(voxel_mm: float, clearance_mm: float, **options: Any) ->
     )
 
 
-@lru_cache(maxsize=64)
-def _single(
-    voxel_mm: float,
-    clearance_mm: float,
-    *,
-    barrel_radius_mm: float | None = None,
-    pin_radius_mm: float | None = None,
-    knuckles: int = 3,
-    gap_mm: float | None = None,
-    bracket_mm: float | None = None,
-    margin_mm: float | None = None,
-    wall_mm: float = 0.8,
-    segments: int = 64,
-) -> HingeMeshes:
+class _Sizes(NamedTuple):
+    """Sizes in mm that both kinds of hinges derive alike, and the same as keywords of a hinge."""
+
+    barrel: float
+    pin: float
+    groove: float
+    bracket: Bracket
+    keywords: BarrelKeywords
+
+
+def _sizes(voxel_mm: float, clearance_mm: float, knuckles: int, options: MeshOptions) -> _Sizes:
     room = Clearance(clearance_mm)
-    barrel = barrel_radius_mm
+    wall, margin = options.wall_mm, options.margin_mm
+    barrel, pin = options.barrel_radius_mm, options.pin_radius_mm
     if barrel is None:
-        barrel, _ = default_radii(voxel_mm, room, wall_mm, knuckles, margin_mm, widest=5.0)
-    pin = default_pin_radius(barrel, room, wall_mm) if pin_radius_mm is None else pin_radius_mm
-    reach = barrel + room.radial
-    bracket = max(0.15 * voxel_mm, reach + 1.2) if bracket_mm is None else bracket_mm
-    spec = SingleSpec.read(
-        voxel_mm,
-        knuckles=knuckles,
-        radius=barrel,
-        pin=ConePin(pin),
-        clearance=room,
-        leaf=Bracket(bracket),
-        gap=gap_mm,
-        margin=margin_mm,
-        wall=wall_mm,
-    )
-    plan = plan_single(spec)
-    parent, parent_carve = half_of(plan.parent, segments)
-    child, child_carve = half_of(plan.child, segments)
-    return HingeMeshes(
-        part_of(parent),
-        part_of(child),
-        part_of(parent_carve),
-        part_of(child_carve),
+        barrel, _ = default_radii(voxel_mm, room, wall, knuckles, margin, widest=5.0)
+    if pin is None:
+        pin = default_pin_radius(barrel, room, wall)
+    groove = barrel + room.radial
+    bracket = options.bracket_mm
+    return _Sizes(
         barrel,
         pin,
+        groove,
+        Bracket(max(0.15 * voxel_mm, groove + 1.2) if bracket is None else bracket),
+        {
+            "radius": barrel,
+            "pin": ConePin(pin),
+            "clearance": room,
+            "gap": options.gap_mm,
+            "margin": margin,
+            "wall": wall,
+        },
+    )
+
+
+@lru_cache(maxsize=64)
+def _single(
+    voxel_mm: float, clearance_mm: float, knuckles: int, options: MeshOptions
+) -> HingeMeshes:
+    sizes = _sizes(voxel_mm, clearance_mm, knuckles, options)
+    spec = SingleSpec.read(voxel_mm, knuckles=knuckles, leaf=sizes.bracket, **sizes.keywords)
+    plan = plan_single(spec)
+    parent, parent_carve = half_manifolds(plan.parent, options.segments)
+    child, child_carve = half_manifolds(plan.child, options.segments)
+    return HingeMeshes(
+        mesh_part(parent),
+        mesh_part(child),
+        mesh_part(parent_carve),
+        mesh_part(child_carve),
+        sizes.barrel,
+        sizes.pin,
         knuckles,
-        reach,
+        sizes.groove,
     )
 
 
@@ -326,31 +401,35 @@ def double_hinge_meshes(
     first: str = "+y",
     second: str = "-y",
     turns: tuple[float, float] = (180.0, 180.0),
-    **options: Any,
+    *,
+    knuckles: int | None = None,
+    plate_mm: float | None = None,
+    **options: Unpack[MeshKeywords],
 ) -> DoubleHingeMeshes:
     """Build the five pieces of a cone-pinned double hinge for the face between two voxels.
 
     Parameters
     ----------
     voxel_mm : float
-        Side of the face.
+        Side of the face in mm.
     clearance_mm : float
-        Normal clearance in the hinge, and room around the link plate.
+        Normal clearance in the hinge, and room around the link plate, in mm.
     first, second : {"+y", "-y", "+z", "-z"}
-        Edges of the two axes.
+        Edges of the parent-link and of the link-child axis.
     turns : (float, float)
         How far each axis turns: 90, 180 or 270 degrees.
-    barrel_radius_mm, pin_radius_mm, gap_mm, bracket_mm, margin_mm, wall_mm, segments
-        As for :func:`single_hinge_meshes`.
     knuckles : int, optional
-        On each axis, 3 by default; 5 when both share an edge.
+        Number of knuckles on each axis. 3 when left out, or 5 when both axes share an edge.
     plate_mm : float, optional
-        Thickness of the link plate; 2, or thinner where a small barrel asks for it.
+        Thickness of the link plate in mm; 2, or thinner where a small barrel asks for it.
+    **options
+        Sizes that :class:`MeshOptions` names.
 
     Returns
     -------
     DoubleHingeMeshes
-        The work is cached by the arguments; the arrays are the caller's own copies.
+        The pieces and the sizes that were used. The work is cached by the arguments; the arrays
+        are the caller's own copies.
 
     Raises
     ------
@@ -359,8 +438,16 @@ def double_hinge_meshes(
     HingeError
         If an edge or a turn is unknown.
     """
-    pair = (float(turns[0]), float(turns[1]))
-    made = _double(float(voxel_mm), float(clearance_mm), first, second, pair, **options)
+    made = _double(
+        float(voxel_mm),
+        float(clearance_mm),
+        first,
+        second,
+        (float(turns[0]), float(turns[1])),
+        knuckles or (5 if first == second else 3),
+        plate_mm,
+        MeshOptions(**options),
+    )
     return made._replace(
         parent_half=made.parent_half.copied(),
         link=made.link.copied(),
@@ -378,54 +465,35 @@ def _double(
     first: str,
     second: str,
     turns: tuple[float, float],
-    *,
-    barrel_radius_mm: float | None = None,
-    pin_radius_mm: float | None = None,
-    knuckles: int | None = None,
-    plate_mm: float | None = None,
-    gap_mm: float | None = None,
-    bracket_mm: float | None = None,
-    margin_mm: float | None = None,
-    wall_mm: float = 0.8,
-    segments: int = 64,
+    knuckles: int,
+    plate_mm: float | None,
+    options: MeshOptions,
 ) -> DoubleHingeMeshes:
-    room = Clearance(clearance_mm)
-    count = knuckles or (5 if first == second else 3)
-    barrel = barrel_radius_mm
-    if barrel is None:
-        barrel, _ = default_radii(voxel_mm, room, wall_mm, count, margin_mm, widest=5.0)
-    pin = default_pin_radius(barrel, room, wall_mm) if pin_radius_mm is None else pin_radius_mm
-    reach = barrel + room.radial
-    bracket = max(0.15 * voxel_mm, reach + 1.2) if bracket_mm is None else bracket_mm
+    sizes = _sizes(voxel_mm, clearance_mm, knuckles, options)
     spec = DoubleSpec.read(
         voxel_mm,
         first=first,
         second=second,
         turns=turns,
-        knuckles=count,
-        radius=barrel,
-        pin=ConePin(pin),
-        clearance=room,
+        knuckles=knuckles,
         plate=plate_mm,
-        bracket=Bracket(bracket),
-        gap=gap_mm,
-        margin=margin_mm,
-        wall=wall_mm,
+        bracket=sizes.bracket,
+        **sizes.keywords,
     )
     plan = plan_double(spec)
-    parent, parent_carve = half_of(plan.parent, segments)
-    child, child_carve = half_of(plan.child, segments)
-    link, _ = half_of(plan.link, segments)
+    parent, parent_carve = half_manifolds(plan.parent, options.segments)
+    child, child_carve = half_manifolds(plan.child, options.segments)
+    link, _ = half_manifolds(plan.link, options.segments)
     return DoubleHingeMeshes(
-        part_of(parent),
-        part_of(link),
-        part_of(child),
-        part_of(parent_carve),
-        part_of(child_carve),
-        part_of(solid_of(plate_shape(spec), segments, outside=False)),
-        barrel,
-        pin,
-        count,
-        reach,
+        mesh_part(parent),
+        mesh_part(link),
+        mesh_part(child),
+        mesh_part(parent_carve),
+        mesh_part(child_carve),
+        mesh_part(manifold_of(plate_shape(spec), options.segments, outside=False)),
+        sizes.barrel,
+        sizes.pin,
+        knuckles,
+        sizes.groove,
         spec.plate,
     )

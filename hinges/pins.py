@@ -1,8 +1,8 @@
 """Pins: what holds the knuckles of a hinge on their axis.
 
 A pin says how it shapes every knuckle, what it takes out of the bodies beside them, and whether
-the result can be printed. Printed pins grow on the knuckles of the train's holder (the parent of
-a single hinge); loose ones (:mod:`hinges.hardware`) are put in after printing.
+the result can be printed. Printed pins grow on the knuckles of the layout's pin owner, which is the
+parent of a single hinge. Loose ones (:mod:`hinges.hardware`) are put in after printing.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from math import cos, radians, sin, tan
 from typing import Literal
 
 from .clearance import Clearance
-from .errors import HingeError
+from .exceptions import HingeError
 from .fit import at_least
+from .knuckles import Knuckle, KnuckleLayout
 from .shapes import Point, Prism, Shape, Turned, cylinder, regular, teardrop
-from .train import Span, Train
 
-__all__ = ["ConePin", "Pin", "Ring", "Roof", "StraightPin"]
+__all__ = ["BoreForm", "ConePin", "ContactCircle", "Pin", "StraightPin"]
 
-Owned = tuple[int, Shape]
+OwnedShape = tuple[int, Shape]
 _SLOPE = 2.0**0.5
 
 
 @dataclass(frozen=True)
-class Roof:
-    """How bores that lie down while printing are closed above.
+class BoreForm:
+    """Form of the bores of hinges: how those that lie while printing are closed above.
 
     Attributes
     ----------
@@ -50,28 +50,43 @@ class Roof:
         """Largest radius of the bore over the radius of the round one."""
         return {"round": 1.0, "teardrop": 1.219, "octagon": 1.0 / cos(radians(22.5))}[self.style]
 
-    def over(self, radius: float, span: Span) -> tuple[Prism, ...]:
-        """Give what to cut besides the round bore of `radius` (mm) through a knuckle."""
-        up = self.up[span.owner]
+    def roof(self, radius: float, knuckle: Knuckle) -> tuple[Prism, ...]:
+        """Plan what to cut besides the round bore of a knuckle.
+
+        Parameters
+        ----------
+        radius : float
+            Radius of the bore in mm.
+        knuckle : Knuckle
+            The knuckle that the bore goes through.
+
+        Returns
+        -------
+        tuple of Prism
+            The roof; empty for a round bore.
+        """
+        up = self.up[knuckle.owner]
         if self.style == "teardrop":
-            return (teardrop(radius, span.start, span.end, up),)
+            return (teardrop(radius, knuckle.start, knuckle.end, up),)
         if self.style == "octagon":
-            return (regular(8, 2.0 * radius, span.start, span.end, up + 22.5),)
+            return (regular(8, 2.0 * radius, knuckle.start, knuckle.end, up + 22.5),)
         return ()
 
 
 @dataclass(frozen=True)
-class Ring:
-    """A circle on the holder's pin and how near the bore around it is, for play.
+class ContactCircle:
+    """A circle on a pin and how near the bore around it is.
 
     Attributes
     ----------
-    z, radius : float
-        In mm.
+    z : float
+        Plane of the circle along the axis in mm.
+    radius : float
+        Radius of the circle in mm.
     normal : (radial, axial) float
-        Outward normal of the pin's surface.
+        Outward unit normal of the pin's surface there.
     gap : float
-        To the facing surface, in mm.
+        Distance to the facing surface in mm.
     """
 
     z: float
@@ -84,77 +99,214 @@ class Pin(ABC):
     """What every kind of pin tells the hinge."""
 
     @abstractmethod
-    def reach(self, train: Train, roof: Roof) -> float:
-        """Largest radius in mm that the pin takes out of a barrel."""
+    def largest_radius(self, layout: KnuckleLayout, bore_form: BoreForm) -> float:
+        """Measure how far from the axis the pin, its bore or its recess reaches in a barrel.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        bore_form : BoreForm
+            How bores are closed above.
+
+        Returns
+        -------
+        float
+            Radius in mm.
+        """
 
     @abstractmethod
-    def check(self, train: Train, wall: float, roof: Roof) -> None:
-        """Raise :class:`~hinges.errors.FitError` for a train that these pins cannot hold."""
+    def check(self, layout: KnuckleLayout, wall: float, bore_form: BoreForm) -> None:
+        """Refuse a layout that this pin cannot hold.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        wall : float
+            Thinnest wall in mm.
+        bore_form : BoreForm
+            How bores are closed above.
+
+        Raises
+        ------
+        FitError
+            If a wall or the pin is too thin, or the child can leave along the axis.
+        """
 
     @abstractmethod
-    def knuckles(self, train: Train, chamfer: float) -> tuple[Owned, ...]:
-        """Shape every knuckle, its round bores and recesses included."""
+    def knuckle_shapes(self, layout: KnuckleLayout, chamfer: float) -> tuple[OwnedShape, ...]:
+        """Shape every knuckle, its round bores and recesses included.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        chamfer : float
+            Leg in mm of the 45° chamfer on the ends of barrels; 0 for none.
+
+        Returns
+        -------
+        tuple of (int, Shape)
+            Number of the owner and shape of each.
+        """
 
     @abstractmethod
     def thinnest_barrel(self, clearance: Clearance, wall: float, knuckles: int) -> float:
-        """Smallest barrel radius in mm that leaves `wall` around the pin."""
+        """Find the smallest barrel that leaves a wall around the pin.
+
+        Parameters
+        ----------
+        clearance : Clearance
+            Room between pin and bore.
+        wall : float
+            Thinnest wall in mm.
+        knuckles : int
+            Number of knuckles.
+
+        Returns
+        -------
+        float
+            Radius of the barrel in mm.
+        """
 
     @abstractmethod
-    def rings(self, train: Train) -> tuple[Ring, ...]:
-        """Where pin and bores face one another, for :func:`hinges.wobble.play`."""
+    def contact_circles(self, layout: KnuckleLayout) -> tuple[ContactCircle, ...]:
+        """Find where pin and bores face one another, for :func:`hinges.joint_play.play`.
 
-    def bores(self, train: Train, roof: Roof) -> tuple[Owned, ...]:
-        """Give what is cut out of the finished halves: roofs, nut pockets."""
-        del train, roof
-        return ()
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
 
-    def access(self, train: Train, edge: float) -> tuple[Shape, ...]:
-        """Give what both bodies give up beyond the knuckles to put a loose pin in.
-
-        `edge` is half the length of the edge in mm.
+        Returns
+        -------
+        tuple of ContactCircle
+            Circles on the pin.
         """
-        del train, edge
+
+    def bore_cuts(self, layout: KnuckleLayout, bore_form: BoreForm) -> tuple[OwnedShape, ...]:
+        """Plan what is cut out of the finished halves: roofs of bores, pockets of nuts.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        bore_form : BoreForm
+            How bores are closed above.
+
+        Returns
+        -------
+        tuple of (int, Shape)
+            Number of the body and shape of each cut.
+        """
+        del layout, bore_form
         return ()
 
-    def hardware(self, train: Train) -> tuple[Shape, ...]:
-        """Draw the loose pin itself; empty for a printed one."""
-        del train
+    def insertion_cuts(self, layout: KnuckleLayout, edge: float) -> tuple[Shape, ...]:
+        """Plan what both bodies give up beyond the knuckles so that a loose pin can go in.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        edge : float
+            Half the length of the edge in mm.
+
+        Returns
+        -------
+        tuple of Shape
+            What to cut from both bodies.
+        """
+        del layout, edge
         return ()
 
-    def _check_common(self, train: Train, wall: float, roof: Roof) -> None:
+    def hardware(self, layout: KnuckleLayout) -> tuple[Shape, ...]:
+        """Draw the loose pin itself.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+
+        Returns
+        -------
+        tuple of Shape
+            Pin, screw and nut in their places; empty for a printed pin.
+        """
+        del layout
+        return ()
+
+    def _check_common(self, layout: KnuckleLayout, wall: float, bore_form: BoreForm) -> None:
         at_least(
             "wall",
             "the barrel wall around the pin's recess or bore",
-            train.radius - self.reach(train, roof),
+            layout.radius - self.largest_radius(layout, bore_form),
             wall,
             "use a wider barrel, a thinner pin or a smaller clearance",
         )
         at_least(
             "knuckle",
             "the length of a knuckle",
-            min(span.length for span in train.spans),
+            min(knuckle.length for knuckle in layout.knuckles),
             2.0 * wall,
             "use fewer knuckles or a longer edge",
         )
 
 
-def rim(radius: float, chamfer: float, face: float, inward: float) -> list[Point]:
-    """Outer corners of a barrel's end: the chamfer's two, or one."""
+def barrel_end(radius: float, chamfer: float, face: float, inward: float) -> list[Point]:
+    """Draw the outer corners of a barrel's end.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the barrel in mm.
+    chamfer : float
+        Leg of its 45° chamfer in mm; 0 for none.
+    face : float
+        End plane, z in mm.
+    inward : float
+        Direction along z from the end into the barrel: 1 or -1.
+
+    Returns
+    -------
+    list of (radius, z)
+        In mm: the chamfer's two corners, or one.
+    """
     if chamfer <= 0.0:
         return [(radius, face)]
     return [(radius - chamfer, face), (radius, face + inward * chamfer)]
 
 
-def ring(train: Train, span: Span, chamfer: float, start: list[Point], end: list[Point]) -> Turned:
-    """Turn a knuckle whose inner outline at its two ends is given from the inside outwards."""
-    first = start + rim(train.radius, chamfer, span.start, 1.0)
-    second = end + rim(train.radius, chamfer, span.end, -1.0)
+def turned_knuckle(
+    layout: KnuckleLayout, knuckle: Knuckle, chamfer: float, start: list[Point], end: list[Point]
+) -> Turned:
+    """Turn a knuckle with the bore or recess that is given at its two ends.
+
+    Parameters
+    ----------
+    layout : KnuckleLayout
+        The knuckles of the axis.
+    knuckle : Knuckle
+        The one to turn.
+    chamfer : float
+        Leg in mm of the 45° chamfer on its outer rims; 0 for none.
+    start, end : list of (radius, z)
+        Inner outline at either end in mm, from the inside outwards.
+
+    Returns
+    -------
+    Turned
+        The knuckle.
+    """
+    first = start + barrel_end(layout.radius, chamfer, knuckle.start, 1.0)
+    second = end + barrel_end(layout.radius, chamfer, knuckle.end, -1.0)
     return Turned((*first, *reversed(second)))
 
 
 @dataclass(frozen=True)
 class ConePin(Pin):
-    """A captive printed cone on the holder's knuckles, in recesses of the others'.
+    """A captive pin of printed cones on the pin owner's knuckles, in recesses of the others'.
 
     The clearance is normal to the cone: the recess is the cone moved outwards by c / cos(angle),
     so at 45° a child can shift by 1.41 c across the axis before the cones touch.
@@ -162,9 +314,9 @@ class ConePin(Pin):
     Parameters
     ----------
     radius : float
-        At the foot of the cone in mm.
+        Radius at the foot of the cone in mm.
     angle : float
-        Between the cone's surface and the axis in degrees; 45 prints in any pose.
+        Angle between the cone's surface and the axis in degrees; 45 prints in any pose.
     tip : float
         Radius of the blunt tip in mm.
     """
@@ -189,30 +341,63 @@ class ConePin(Pin):
         return (self.radius - self.tip) / tan(radians(self.angle))
 
     def widening(self, clearance: Clearance) -> float:
-        """How much wider than the cone's foot the mouth of the recess is, in mm."""
+        """Compute how much wider than the cone's foot the mouth of the recess is.
+
+        Parameters
+        ----------
+        clearance : Clearance
+            Room between cone and recess.
+
+        Returns
+        -------
+        float
+            Difference of the radii in mm.
+        """
         slope = radians(self.angle)
         return clearance.radial / cos(slope) - clearance.axial * tan(slope)
 
     def mouth(self, clearance: Clearance) -> float:
-        """Radius of the recess in the face of its knuckle, in mm."""
+        """Compute the radius of the recess in the face of its knuckle.
+
+        Parameters
+        ----------
+        clearance : Clearance
+            Room between cone and recess.
+
+        Returns
+        -------
+        float
+            Radius in mm.
+        """
         return self.radius + self.widening(clearance)
 
     def floor(self, clearance: Clearance) -> float:
-        """Radius of the flat floor of the recess, in mm."""
+        """Compute the radius of the flat floor of the recess.
+
+        Parameters
+        ----------
+        clearance : Clearance
+            Room between cone and recess.
+
+        Returns
+        -------
+        float
+            Radius in mm.
+        """
         return self.tip + self.widening(clearance)
 
-    def reach(self, train: Train, roof: Roof) -> float:
+    def largest_radius(self, layout: KnuckleLayout, bore_form: BoreForm) -> float:
         """Largest radius in mm that the pin takes out of a barrel."""
-        del roof
-        return self.mouth(train.clearance)
+        del bore_form
+        return self.mouth(layout.clearance)
 
     def thinnest_barrel(self, clearance: Clearance, wall: float, knuckles: int) -> float:
         """Smallest barrel radius in mm that leaves `wall` around the recess."""
         del knuckles
         return self.mouth(clearance) + wall
 
-    def check(self, train: Train, wall: float, roof: Roof) -> None:
-        """Refuse a train that these pins cannot hold.
+    def check(self, layout: KnuckleLayout, wall: float, bore_form: BoreForm) -> None:
+        """Refuse a layout that these pins cannot hold.
 
         Raises
         ------
@@ -222,7 +407,7 @@ class ConePin(Pin):
         at_least(
             "retention",
             "the number of knuckles on a cone-pinned axis",
-            len(train.spans),
+            len(layout.knuckles),
             3,
             "use 3 knuckles or more, a straight pin with a head, or a screw",
             "",
@@ -230,41 +415,41 @@ class ConePin(Pin):
         at_least(
             "wall",
             "the barrel wall around a recess (r - r_pin - 0.414 c at 45°)",
-            train.radius - self.reach(train, roof),
+            layout.radius - self.largest_radius(layout, bore_form),
             wall,
             "use a wider barrel, a thinner pin or a smaller clearance",
         )
-        self._check_common(train, wall, roof)
+        self._check_common(layout, wall, bore_form)
         at_least(
             "cone",
             "the depth that a cone keeps in its recess after its axial play",
-            self.height - 2.0 * train.clearance.axial,
+            self.height - 2.0 * layout.clearance.axial,
             0.2,
             "use a thicker pin, a sharper tip or a smaller clearance",
         )
-        last = len(train.spans) - 1
-        for index, span in enumerate(train.spans):
-            if span.owner == train.holder:
+        last = len(layout.knuckles) - 1
+        for index, knuckle in enumerate(layout.knuckles):
+            if knuckle.owner == layout.pin_owner:
                 continue
             recesses = (index > 0) + (index < last)
             between = "between the recesses" if recesses == 2 else "behind the recess"
             at_least(
                 "web",
                 f"the material {between} of knuckle {index + 1}",
-                span.length - recesses * self.height,
+                knuckle.length - recesses * self.height,
                 wall,
                 "use fewer knuckles, a thinner pin or a longer edge",
             )
 
-    def knuckles(self, train: Train, chamfer: float) -> tuple[Owned, ...]:
+    def knuckle_shapes(self, layout: KnuckleLayout, chamfer: float) -> tuple[OwnedShape, ...]:
         """Turn every knuckle with its cones or recesses in one outline."""
-        mouth, floor = self.mouth(train.clearance), self.floor(train.clearance)
-        last = len(train.spans) - 1
+        mouth, floor = self.mouth(layout.clearance), self.floor(layout.clearance)
+        last = len(layout.knuckles) - 1
 
         def core(owner: int, face: float, inward: float, outer: bool) -> list[Point]:
             if outer:
                 return [(0.0, face)]
-            if owner == train.holder:
+            if owner == layout.pin_owner:
                 far = face - inward * self.height
                 return [(0.0, far), (self.tip, far), (self.radius, face)]
             far = face + inward * self.height
@@ -272,28 +457,28 @@ class ConePin(Pin):
 
         return tuple(
             (
-                span.owner,
-                ring(
-                    train,
-                    span,
+                knuckle.owner,
+                turned_knuckle(
+                    layout,
+                    knuckle,
                     chamfer,
-                    core(span.owner, span.start, 1.0, index == 0),
-                    core(span.owner, span.end, -1.0, index == last),
+                    core(knuckle.owner, knuckle.start, 1.0, index == 0),
+                    core(knuckle.owner, knuckle.end, -1.0, index == last),
                 ),
             )
-            for index, span in enumerate(train.spans)
+            for index, knuckle in enumerate(layout.knuckles)
         )
 
-    def rings(self, train: Train) -> tuple[Ring, ...]:
+    def contact_circles(self, layout: KnuckleLayout) -> tuple[ContactCircle, ...]:
         """Foot and tip of every cone."""
         slope = radians(self.angle)
-        gap = train.clearance.radial
+        gap = layout.clearance.radial
         made = []
-        for one, after in zip(train.spans, train.spans[1:], strict=False):
-            face, up = (one.end, 1.0) if one.owner == train.holder else (after.start, -1.0)
+        for one, after in zip(layout.knuckles, layout.knuckles[1:], strict=False):
+            face, up = (one.end, 1.0) if one.owner == layout.pin_owner else (after.start, -1.0)
             normal = (cos(slope), up * sin(slope))
-            made.append(Ring(face, self.radius, normal, gap))
-            made.append(Ring(face + up * self.height, self.tip, normal, gap))
+            made.append(ContactCircle(face, self.radius, normal, gap))
+            made.append(ContactCircle(face + up * self.height, self.tip, normal, gap))
         return tuple(made)
 
 
@@ -301,13 +486,13 @@ class ConePin(Pin):
 class StraightPin(Pin):
     """A captive printed pin that runs through the bores of the other knuckles.
 
-    Where the last knuckle is not the holder's the pin ends in a 45° head in a countersink, so that
-    two knuckles are enough.
+    Where the last knuckle is not the pin owner's, the pin ends in a 45° head in a countersink, so
+    that two knuckles are enough.
 
     Parameters
     ----------
     radius : float
-        Of the pin in mm.
+        Radius of the pin in mm.
     """
 
     radius: float
@@ -321,11 +506,11 @@ class StraightPin(Pin):
         """How far the head stands over the pin, in mm; 0.3 more than its play."""
         return clearance.radial + 0.3
 
-    def reach(self, train: Train, roof: Roof) -> float:
+    def largest_radius(self, layout: KnuckleLayout, bore_form: BoreForm) -> float:
         """Largest radius in mm that the pin takes out of a barrel."""
-        clearance = train.clearance
-        bore = (self.radius + clearance.radial) * roof.factor
-        if all(train.spans[end].owner == train.holder for end in (0, -1)):
+        clearance = layout.clearance
+        bore = (self.radius + clearance.radial) * bore_form.factor
+        if all(layout.knuckles[end].owner == layout.pin_owner for end in (0, -1)):
             return bore
         return max(bore, self.radius + self._head(clearance) + _SLOPE * clearance.radial)
 
@@ -334,15 +519,15 @@ class StraightPin(Pin):
         head = self._head(clearance) + (_SLOPE - 1.0) * clearance.radial
         return self.radius + clearance.radial + (0.0 if knuckles % 2 else head) + wall
 
-    def check(self, train: Train, wall: float, roof: Roof) -> None:
-        """Refuse a train that this pin cannot hold.
+    def check(self, layout: KnuckleLayout, wall: float, bore_form: BoreForm) -> None:
+        """Refuse a layout that this pin cannot hold.
 
         Raises
         ------
         FitError
             If a wall or the pin is too thin.
         """
-        self._check_common(train, wall, roof)
+        self._check_common(layout, wall, bore_form)
         at_least(
             "pin",
             "the thickness of the printed pin",
@@ -351,27 +536,27 @@ class StraightPin(Pin):
             "use a thicker pin, or a loose one",
         )
 
-    def knuckles(self, train: Train, chamfer: float) -> tuple[Owned, ...]:
-        """Turn the holder's knuckles and pin in one outline, and every other knuckle's ring."""
-        gap = train.clearance.radial
-        head = self._head(train.clearance)
+    def knuckle_shapes(self, layout: KnuckleLayout, chamfer: float) -> tuple[OwnedShape, ...]:
+        """Turn the pin owner's knuckles and pin in one outline, and every other knuckle's ring."""
+        gap = layout.clearance.radial
+        head = self._head(layout.clearance)
         bore = self.radius + gap
-        made: list[Owned] = []
+        made: list[OwnedShape] = []
         outline: list[Point] = []
-        last = len(train.spans) - 1
-        for index, span in enumerate(train.spans):
-            if span.owner == train.holder:
+        last = len(layout.knuckles) - 1
+        for index, knuckle in enumerate(layout.knuckles):
+            if knuckle.owner == layout.pin_owner:
                 if index:
-                    outline.append((self.radius, span.start))
-                outline += rim(train.radius, chamfer, span.start, 1.0)
-                outline += reversed(rim(train.radius, chamfer, span.end, -1.0))
+                    outline.append((self.radius, knuckle.start))
+                outline += barrel_end(layout.radius, chamfer, knuckle.start, 1.0)
+                outline += reversed(barrel_end(layout.radius, chamfer, knuckle.end, -1.0))
                 if index < last:
-                    outline.append((self.radius, span.end))
+                    outline.append((self.radius, knuckle.end))
                 continue
             ends: list[list[Point]] = []
             for outer, face, inward in (
-                (index == 0, span.start, 1.0),
-                (index == last, span.end, -1.0),
+                (index == 0, knuckle.start, 1.0),
+                (index == last, knuckle.end, -1.0),
             ):
                 if not outer:
                     ends.append([(bore, face)])
@@ -380,44 +565,51 @@ class StraightPin(Pin):
                 outline += flare if index == 0 else reversed(flare)
                 foot = face + inward * (head + (_SLOPE - 1.0) * gap)
                 ends.append([(bore, foot), (self.radius + head + _SLOPE * gap, face)])
-            made.append((span.owner, ring(train, span, chamfer, *ends)))
+            made.append((knuckle.owner, turned_knuckle(layout, knuckle, chamfer, *ends)))
         whole = Turned(((0.0, outline[0][1]), *outline, (0.0, outline[-1][1])))
-        return ((train.holder, whole), *made)
+        return ((layout.pin_owner, whole), *made)
 
-    def bores(self, train: Train, roof: Roof) -> tuple[Owned, ...]:
+    def bore_cuts(self, layout: KnuckleLayout, bore_form: BoreForm) -> tuple[OwnedShape, ...]:
         """Give the roofs over the bores."""
-        radius = self.radius + train.clearance.radial
+        radius = self.radius + layout.clearance.radial
         return tuple(
-            (span.owner, roof_shape)
-            for span in train.spans
-            if span.owner != train.holder
-            for roof_shape in roof.over(radius, span)
+            (knuckle.owner, roof_shape)
+            for knuckle in layout.knuckles
+            if knuckle.owner != layout.pin_owner
+            for roof_shape in bore_form.roof(radius, knuckle)
         )
 
-    def access(self, train: Train, edge: float) -> tuple[Shape, ...]:
+    def insertion_cuts(self, layout: KnuckleLayout, edge: float) -> tuple[Shape, ...]:
         """Clear the bodies before the flat end of a head."""
         del edge
-        wide = self.radius + self._head(train.clearance) + _SLOPE * train.clearance.radial
-        room = train.clearance.axial
+        wide = self.radius + self._head(layout.clearance) + _SLOPE * layout.clearance.radial
+        room = layout.clearance.axial
         ends = (
-            (train.spans[0], train.start - room, train.start),
-            (train.spans[-1], train.end, train.end + room),
+            (layout.knuckles[0], layout.start - room, layout.start),
+            (layout.knuckles[-1], layout.end, layout.end + room),
         )
         return tuple(
-            cylinder(wide, low, high) for span, low, high in ends if span.owner != train.holder
+            cylinder(wide, low, high)
+            for knuckle, low, high in ends
+            if knuckle.owner != layout.pin_owner
         )
 
-    def rings(self, train: Train) -> tuple[Ring, ...]:
+    def contact_circles(self, layout: KnuckleLayout) -> tuple[ContactCircle, ...]:
         """Both ends of every bore, and the flare of a head."""
-        gap, head = train.clearance.radial, self._head(train.clearance)
+        gap, head = layout.clearance.radial, self._head(layout.clearance)
         made = []
-        last = len(train.spans) - 1
-        for index, span in enumerate(train.spans):
-            if span.owner == train.holder:
+        last = len(layout.knuckles) - 1
+        for index, knuckle in enumerate(layout.knuckles):
+            if knuckle.owner == layout.pin_owner:
                 continue
-            made += [Ring(z, self.radius, (1.0, 0.0), gap) for z in (span.start, span.end)]
-            for outer, face, up in ((index == 0, span.start, 1.0), (index == last, span.end, -1.0)):
+            made += [
+                ContactCircle(z, self.radius, (1.0, 0.0), gap) for z in (knuckle.start, knuckle.end)
+            ]
+            for outer, face, up in (
+                (index == 0, knuckle.start, 1.0),
+                (index == last, knuckle.end, -1.0),
+            ):
                 if outer:
                     normal = (0.5**0.5, up * 0.5**0.5)
-                    made.append(Ring(face, self.radius + head, normal, gap))
+                    made.append(ContactCircle(face, self.radius + head, normal, gap))
         return tuple(made)

@@ -10,18 +10,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import sqrt
-from typing import Any, Final, Literal
+from typing import Final, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .barrel import BarrelSpec, barrel_spec
 from .clearance import Clearance
-from .errors import HingeError
+from .exceptions import HingeError
 from .fit import at_least
+from .knuckles import KnuckleLayout, groove, lay_out_knuckles
 from .leaf import Bracket
-from .plan import BarrelOptions, BarrelSpec, HalfPlan
-from .shapes import Moved, Point, Prism, Shape, box, cylinder
-from .train import Train, groove, lay_out
+from .options import DoubleHingeKeywords, DoubleHingeOptions
+from .shapes import HalfPlan, Moved, Point, Prism, Shape, box, cylinder
 
 __all__ = [
     "EDGES",
@@ -34,7 +35,6 @@ __all__ = [
 ]
 
 Matrix = NDArray[np.float64]
-Edge = Literal["+y", "-y", "+z", "-z"]
 
 EDGES: Final[dict[str, tuple[float, float, float]]] = {
     "+y": (0.0, 1.0, 0.0),
@@ -62,7 +62,23 @@ def _neck(radius: float, plate: float, clearance: Clearance, top: float | None) 
 
 @dataclass(frozen=True, kw_only=True)
 class DoubleSpec(BarrelSpec):
-    """All parameters of a double hinge, defaults filled in; see :class:`hinges.DoubleHinge`."""
+    """All parameters of a double hinge, defaults filled in.
+
+    Attributes
+    ----------
+    size : float
+        Side of the shared face in mm.
+    first, second : str
+        Edges of the parent-link and of the link-child axis: "+y", "-y", "+z" or "-z".
+    turns : (float, float)
+        How far each axis turns, in degrees: 90, 180 or 270.
+    angles : (float, float)
+        Angles of the two axes in degrees at which the hinge is drawn and printed.
+    plate : float
+        Thickness of the link plate in mm.
+    bracket : Bracket
+        What joins the knuckles of the parent's and the child's half.
+    """
 
     size: float
     first: str
@@ -73,29 +89,34 @@ class DoubleSpec(BarrelSpec):
     bracket: Bracket
 
     @classmethod
-    def read(
-        cls,
-        size: float,
-        *,
-        first: str = "+y",
-        second: str = "-y",
-        turns: tuple[float, float] = (180.0, 180.0),
-        angles: tuple[float, float] = (0.0, 0.0),
-        knuckles: int | None = None,
-        plate: float | None = None,
-        bracket: Bracket | None = None,
-        **barrel: Any,
-    ) -> DoubleSpec:
-        """Fill in the defaults; parameters as for :class:`hinges.DoubleHinge`.
+    def read(cls, size: float, **keywords: Unpack[DoubleHingeKeywords]) -> DoubleSpec:
+        """Fill in the defaults.
 
-        `barrel` are those of :class:`hinges.plan.BarrelOptions`.
+        Parameters
+        ----------
+        size : float
+            Side of the shared face in mm.
+        **keywords
+            The keywords of :class:`hinges.DoubleHinge`.
+
+        Returns
+        -------
+        DoubleSpec
+            All sizes, not yet checked against the rules of fit.
+
+        Raises
+        ------
+        HingeError
+            If the clearance cannot be read or the form of the bores is unknown.
         """
+        options = DoubleHingeOptions(**keywords)
+        knuckles, plate = options.knuckles, options.plate
         if knuckles is None:
-            knuckles = 5 if first == second else 3
+            knuckles = 5 if options.first == options.second else 3
         # The bores' roofs are the same in every pose: each axis has its own direction of printing.
-        shared = BarrelOptions(**barrel).filled(size, knuckles, (0.0, 0.0, 0.0))
+        shared = barrel_spec(options, size, knuckles, (0.0, 0.0, 0.0))
         if plate is None:
-            tops = [shared.gap / 2.0 if turn <= 180.0 else None for turn in turns]
+            tops = [shared.gap / 2.0 if turn <= 180.0 else None for turn in options.turns]
             necks = {
                 t: min(_neck(shared.radius, t, shared.clearance, top) for top in tops)
                 for t in (2.0, 1.8, 1.6, 1.4, 1.2)
@@ -103,12 +124,12 @@ class DoubleSpec(BarrelSpec):
             plate = next((t for t, neck in necks.items() if neck >= shared.wall), 2.0)
         return cls(
             size=float(size),
-            first=first,
-            second=second,
-            turns=(float(turns[0]), float(turns[1])),
-            angles=(float(angles[0]), float(angles[1])),
+            first=options.first,
+            second=options.second,
+            turns=(float(options.turns[0]), float(options.turns[1])),
+            angles=(float(options.angles[0]), float(options.angles[1])),
             plate=float(plate),
-            bracket=Bracket() if bracket is None else bracket,
+            bracket=Bracket() if options.bracket is None else options.bracket,
             **vars(shared),
         )
 
@@ -118,10 +139,18 @@ class DoubleSpec(BarrelSpec):
         return self.first == self.second
 
     def frame(self, axis: int) -> Matrix:
-        """Lay out an axis as a (4, 4) matrix.
+        """Lay out the frame of an axis.
 
-        z runs along the axis and y out of the face; x points from the block (the parent for axis
-        0, the child for axis 1) to the link.
+        Parameters
+        ----------
+        axis : int
+            0 for the parent-link axis, 1 for the link-child axis.
+
+        Returns
+        -------
+        (4, 4) float64 array
+            Frame in mm. z runs along the axis and y out of the face; x points to the link, from the
+            parent for axis 0 and from the child for axis 1.
         """
         side = 1.0 if axis == 0 else -1.0
         outwards = np.array(EDGES[self.second if axis else self.first])
@@ -141,16 +170,17 @@ class DoublePlan:
     Attributes
     ----------
     spec : DoubleSpec
-    trains : tuple of Train
-        One for each axis; a single one when both axes lie on one edge.
+        The parameters that it was made from.
+    layouts : tuple of KnuckleLayout
+        The knuckles of each axis; a single layout when both axes lie on one edge.
     parent, link, child : HalfPlan
-        All in the pose with both angles 0.
+        Shapes of the three bodies, all in the pose with both angles 0.
     loose : tuple of Shape
-        Loose pins, if any.
+        Shapes of the loose pins; empty for printed ones.
     """
 
     spec: DoubleSpec
-    trains: tuple[Train, ...]
+    layouts: tuple[KnuckleLayout, ...]
     parent: HalfPlan
     link: HalfPlan
     child: HalfPlan
@@ -158,7 +188,20 @@ class DoublePlan:
 
 
 def placed(matrix: Matrix, shape: Shape) -> Moved:
-    """Lay a shape into the frame given by a (4, 4) matrix."""
+    """Lay a shape into a frame.
+
+    Parameters
+    ----------
+    matrix : (4, 4) float64 array
+        The frame, in mm.
+    shape : Turned, Prism or Moved
+        The shape in its own frame.
+
+    Returns
+    -------
+    Moved
+        The shape in its place.
+    """
     origin, z_dir, x_dir = (
         (float(column[0]), float(column[1]), float(column[2]))
         for column in (matrix[:3, 3], matrix[:3, 2], matrix[:3, 0])
@@ -186,17 +229,58 @@ def _about(frame: Matrix, angle: float) -> Matrix:
 
 
 def link_pose(spec: DoubleSpec, first: float) -> Matrix:
-    """Pose of the link for an angle of the first axis (degrees), as a (4, 4) matrix in mm."""
+    """Compute the pose of the link.
+
+    Parameters
+    ----------
+    spec : DoubleSpec
+        The hinge.
+    first : float
+        Angle of the first axis in degrees.
+
+    Returns
+    -------
+    (4, 4) float64 array
+        Rigid transform in mm from the pose with both angles 0.
+    """
     return _about(spec.frame(0), first)
 
 
 def child_pose(spec: DoubleSpec, first: float, second: float) -> Matrix:
-    """Pose of the child for the angles of both axes (degrees), as a (4, 4) matrix in mm."""
+    """Compute the pose of the child.
+
+    Parameters
+    ----------
+    spec : DoubleSpec
+        The hinge.
+    first, second : float
+        Angles of the two axes in degrees.
+
+    Returns
+    -------
+    (4, 4) float64 array
+        Rigid transform in mm from the pose with both angles 0.
+    """
     return link_pose(spec, first) @ _about(spec.frame(1), -second)
 
 
 def plate_shape(spec: DoubleSpec, grow: float = 0.0, beyond: float = 0.0) -> Moved:
-    """Draw the link plate, `grow` mm larger on every side and `beyond` mm more in its plane."""
+    """Draw the link plate without its knuckles.
+
+    Parameters
+    ----------
+    spec : DoubleSpec
+        The hinge.
+    grow : float
+        How much larger it is drawn on every side, in mm.
+    beyond : float
+        How much larger again in its plane, in mm.
+
+    Returns
+    -------
+    Moved
+        The plate in the pose with both angles 0.
+    """
     u_dir = np.array(EDGES[spec.first])
     v_dir = np.cross((1.0, 0.0, 0.0), u_dir)
     frame = np.eye(4)
@@ -243,10 +327,10 @@ def _block_top(spec: DoubleSpec, axis: int) -> float:
     return 0.5 * spec.gap
 
 
-def _check(spec: DoubleSpec, trains: tuple[Train, ...]) -> None:
-    for train in trains:
-        spec.pin.check(train, spec.wall, spec.roof)
-    widest = max(spec.pin.reach(train, spec.roof) for train in trains)
+def _check(spec: DoubleSpec, layouts: tuple[KnuckleLayout, ...]) -> None:
+    for layout in layouts:
+        spec.pin.check(layout, spec.wall, spec.bore_form)
+    widest = max(spec.pin.largest_radius(layout, spec.bore_form) for layout in layouts)
     at_least(
         "chamfer",
         "the flat that the chamfer leaves on a barrel's end",
@@ -254,7 +338,7 @@ def _check(spec: DoubleSpec, trains: tuple[Train, ...]) -> None:
         0.4 if spec.chamfer else 0.0,
         "use a smaller chamfer, a thinner pin or a wider barrel",
     )
-    reach = trains[0].reach
+    reach = layouts[0].groove_radius
     at_least("plate", "the thickness of the link plate", spec.plate, spec.wall, "use a thicker one")
     at_least(
         "plate",
@@ -310,42 +394,56 @@ def _read_checked(spec: DoubleSpec) -> None:
 def plan_double(spec: DoubleSpec) -> DoublePlan:
     """Check all rules of fit and plan every shape of a double hinge.
 
+    Parameters
+    ----------
+    spec : DoubleSpec
+        All parameters of the hinge.
+
+    Returns
+    -------
+    DoublePlan
+        The plan; cached by the parameters.
+
     Raises
     ------
     FitError
-        Naming the rule, the value and what to change.
+        If the hinge cannot be printed, naming the rule, the value and what to change.
     HingeError
         If a parameter makes no sense.
     """
     _read_checked(spec)
     room = (spec.knuckles, spec.radius, spec.clearance, spec.margin)
     if spec.same_edge:
-        trains: tuple[Train, ...] = (lay_out(spec.size, *room, owners=(1, 0, 1, 2), holder=1),)
+        layouts: tuple[KnuckleLayout, ...] = (
+            lay_out_knuckles(spec.size, *room, owners=(1, 0, 1, 2), pin_owner=1),
+        )
         blocks = ((0, 0, 0), (1, 0, 2))
     else:
-        trains = (lay_out(spec.size, *room), lay_out(spec.size, *room))
+        layouts = (lay_out_knuckles(spec.size, *room), lay_out_knuckles(spec.size, *room))
         blocks = ((0, 0, 0), (1, 1, 0))
-    _check(spec, trains)
-    core = 0.5 * (max(spec.pin.reach(train, spec.roof) for train in trains) + spec.radius)
-    links = [groove(train, 1, core) for train in trains]
+    _check(spec, layouts)
+    core = 0.5 * (
+        max(spec.pin.largest_radius(layout, spec.bore_form) for layout in layouts) + spec.radius
+    )
+    links = [groove(layout, 1, core) for layout in layouts]
     edge = 0.5 * spec.size
     bodies = []
     for axis, index, owner in blocks:
-        frame, train = spec.frame(axis), trains[index]
-        rows = spec.frame(index)  # where the train's own z runs
+        frame, layout = spec.frame(axis), layouts[index]
+        rows = spec.frame(index)  # where the layout's own z runs
         near = 0.5 * spec.plate + spec.clearance.radial
         width = _width(spec)
         depth = width if spec.bracket.depth is None else spec.bracket.depth
-        web = box(-width, -near, -depth, -_block_top(spec, axis), train.start, train.end)
-        barrels = spec.pin.knuckles(train, spec.chamfer)
-        roofs = spec.pin.bores(train, spec.roof)
-        carve: list[Shape] = [placed(rows, groove(train, owner, core))]
-        carve += [placed(rows, shape) for shape in spec.pin.access(train, edge)]
+        web = box(-width, -near, -depth, -_block_top(spec, axis), layout.start, layout.end)
+        barrels = spec.pin.knuckle_shapes(layout, spec.chamfer)
+        roofs = spec.pin.bore_cuts(layout, spec.bore_form)
+        carve: list[Shape] = [placed(rows, groove(layout, owner, core))]
+        carve += [placed(rows, shape) for shape in spec.pin.insertion_cuts(layout, edge)]
         in_way: list[Shape] = [plate_shape(spec, spec.clearance.radial, _swing(spec))]
         if not spec.same_edge:
-            other = trains[1 - index]
+            other = layouts[1 - index]
             axial = spec.clearance.axial
-            cleared = cylinder(other.reach, other.start - axial, other.end + axial)
+            cleared = cylinder(other.groove_radius, other.start - axial, other.end + axial)
             in_way.append(placed(spec.frame(1 - axis), cleared))
         carve += in_way
         if spec.turns[axis] > 180.0:
@@ -358,24 +456,24 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
                 tuple(placed(rows, shape) for who, shape in roofs if who == owner),
             )
         )
-    in_link = [(spec.frame(index), train, links[index]) for index, train in enumerate(trains)]
+    in_link = [(spec.frame(index), layout, links[index]) for index, layout in enumerate(layouts)]
     link = HalfPlan(
         tuple(placed(rows, cut) for rows, _, cut in in_link),
         (plate_shape(spec),),
         tuple(
             placed(rows, shape)
-            for rows, train, _ in in_link
-            for who, shape in spec.pin.knuckles(train, spec.chamfer)
+            for rows, layout, _ in in_link
+            for who, shape in spec.pin.knuckle_shapes(layout, spec.chamfer)
             if who == 1
         ),
         tuple(
             placed(rows, shape)
-            for rows, train, _ in in_link
-            for who, shape in spec.pin.bores(train, spec.roof)
+            for rows, layout, _ in in_link
+            for who, shape in spec.pin.bore_cuts(layout, spec.bore_form)
             if who == 1
         ),
     )
     loose = tuple(
-        placed(rows, shape) for rows, train, _ in in_link for shape in spec.pin.hardware(train)
+        placed(rows, shape) for rows, layout, _ in in_link for shape in spec.pin.hardware(layout)
     )
-    return DoublePlan(spec, trains, bodies[0], link, bodies[1], loose)
+    return DoublePlan(spec, layouts, bodies[0], link, bodies[1], loose)

@@ -17,11 +17,10 @@ from build123d import (
     Mode,
     Part,
     RigidJoint,
-    Solid,
 )
 
-from .brep import build_shape, one_part, solids_of
-from .errors import HingeError
+from .exact_solids import build_shape, one_part, solids_of
+from .exceptions import HingeError
 from .fit import at_least, at_most
 from .shapes import Moved, Prism, Shape, box, cylinder
 
@@ -38,8 +37,8 @@ STRAIN_LIMITS: Final[dict[str, float]] = {
     "pa12": 0.020,
     "pp": 0.030,
 }
-"""Strain that printed material bears again and again: about half of its strain at yield, layers
-along the tongue. PLA takes no more than 0.8 %."""
+"""Strain, as a share of 1, that printed material bears again and again: about half of its strain at
+yield, layers along the tongue. PLA takes no more than 0.8 %."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,9 @@ class Magnet:
     across : float
         Diameter, or side of the square, in mm.
     height : float
-        In mm.
+        Height in mm.
     shape : {"round", "square"}
+        Form of the magnet as seen from above.
     """
 
     across: float
@@ -68,7 +68,20 @@ class Magnet:
             )
 
     def outline(self, room: float, bottom: float, top: float) -> Shape:
-        """Draw it `room` mm wider on every side, between two heights in mm."""
+        """Draw the magnet, or the room that it takes.
+
+        Parameters
+        ----------
+        room : float
+            How much wider it is drawn on every side, in mm.
+        bottom, top : float
+            Its two ends, z in mm.
+
+        Returns
+        -------
+        Shape
+            The shape on the z axis.
+        """
         half = 0.5 * self.across + room
         if self.shape == "round":
             return cylinder(half, bottom, top)
@@ -81,15 +94,17 @@ class MagnetPocket(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     magnet : Magnet
+        Form and size of the magnet.
     fit : {"press", "captured"}
-        Pressed in from the face, held by ribs; or laid in while the print is paused and closed in.
-    room : float
-        Free on every side of the magnet in mm; negative for more grip. 0.05 when pressed in,
-        0.15 when captured, if left out.
+        How it is held: pressed in from the face and gripped by ribs, or laid in while the print is
+        paused and closed in.
+    room : float, optional
+        Distance in mm between magnet and pocket on every side; negative for more grip. When left
+        out 0.05 for a pressed magnet, 0.15 for a captured one.
     skin : float
-        Material between a captured magnet and the face, in mm.
+        Thickness in mm of the material between a captured magnet and the face.
     wall : float
-        Thinnest skin in mm.
+        Thinnest skin in mm that the process prints.
     rotation, align, mode
         As for every build123d part; subtracted from the part under construction by default.
 
@@ -102,7 +117,7 @@ class MagnetPocket(BasePartObject):  # type: ignore[misc]
     deep : float
         Depth of the pocket in mm.
     magnet_part : Part
-        The magnet in its place.
+        The magnet in its place, for drawings.
 
     Raises
     ------
@@ -135,11 +150,11 @@ class MagnetPocket(BasePartObject):  # type: ignore[misc]
         # A pressed magnet sits 0.1 below the face; a captured one has 0.2 of air above.
         self.deep = magnet.height + (0.2 if captured else 0.1)
         self.pause_below = self.skin if captured else 0.0
-        super().__init__(part=self.make_pocket(), rotation=rotation, align=align, mode=mode)
+        super().__init__(part=self._built(), rotation=rotation, align=align, mode=mode)
         self.label = f"magnet pocket {magnet.across:g} x {magnet.height:g}"
         RigidJoint("magnet", self)
 
-    def make_pocket(self) -> Part:
+    def _built(self) -> Part:
         """Build the cutter; a pressed magnet is gripped by three (four) ribs of 0.15 mm."""
         bottom, top = -self.skin - self.deep, -self.skin
         over = 0.01 if self.fit == "press" else 0.0
@@ -159,7 +174,7 @@ class MagnetPocket(BasePartObject):  # type: ignore[misc]
 
     @property
     def magnet_part(self) -> Part:
-        """The magnet in its place."""
+        """The magnet in its place, for drawings."""
         bottom = -self.skin - self.deep
         return one_part(
             [build_shape(self.magnet.outline(0.0, bottom, bottom + self.magnet.height))]
@@ -173,19 +188,20 @@ class SnapSpec:
     Parameters
     ----------
     length : float
-        Of the tongue above the face in mm.
+        Length of the tongue above the face in mm.
     thickness, width : float
-        In mm; it bends across its thickness.
+        Its two other sizes in mm; it bends across its thickness.
     catch : float
-        Height of the ridge that drops into the dimple, in mm.
+        Height in mm of the ridge that drops into the dimple.
     clearance : float
-        Between tongue and mortise in mm.
+        Distance between tongue and mortise in mm.
     gap : float
-        Between the two faces in the closed pose, in mm.
+        Distance between the two faces in the closed pose, in mm.
     material : str
-        One of ``STRAIN_LIMITS``.
+        What it is printed in: one of ``STRAIN_LIMITS``.
     lead : float
-        Slope of the ridge against the tongue in degrees: how steeply it goes in and comes out.
+        Lead angle of the ridge, from the tongue, in degrees: how steeply it goes in and comes
+        out.
     wall : float
         Thinnest tongue in mm.
     """
@@ -226,7 +242,7 @@ class SnapSpec:
         Raises
         ------
         FitError
-            Naming the rule and what to change.
+            If a rule of fit fails; it names the rule and what to change.
         HingeError
             If the material is unknown.
         """
@@ -264,7 +280,20 @@ class SnapSpec:
         )
 
     def tongue(self, room: float, over: float) -> tuple[Shape, ...]:
-        """Draw tongue and ridge, `room` mm larger on every side, from `over` mm below the face."""
+        """Draw tongue and ridge, or the room that they take.
+
+        Parameters
+        ----------
+        room : float
+            How much larger they are drawn on every side, in mm.
+        over : float
+            How far below the face they begin, in mm.
+
+        Returns
+        -------
+        tuple of Shape
+            Tongue and ridge.
+        """
         half, side = 0.5 * self.thickness + room, 0.5 * self.width + room
         high = self.length + room
         beam = box(-half, half, -side, side, -over, high)
@@ -300,6 +329,7 @@ class SnapTongue(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     spec : SnapSpec, optional
+        Sizes of the tongue; the defaults when left out.
     rotation, align, mode
         As for every build123d part.
 
@@ -331,7 +361,7 @@ class SnapDimple(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     spec : SnapSpec, optional
-        The tongue's.
+        Sizes of the tongue that goes in; the defaults when left out.
     rotation, align, mode
         As for every build123d part; subtracted from the part under construction by default.
 
@@ -354,17 +384,3 @@ class SnapDimple(BasePartObject):  # type: ignore[misc]
         super().__init__(part=part, rotation=rotation, align=align, mode=mode)
         self.label = "snap dimple"
         RigidJoint("snap", self)
-
-
-def insertion_overlap(spec: SnapSpec, withdrawn: float) -> float:
-    """Volume in mm³ by which an unbent tongue overlaps its mortise when drawn out by some mm.
-
-    Zero in the closed pose; above zero while the ridge has to bend the tongue.
-    """
-    from build123d import Location
-
-    partner = Solid.make_box(20, 20, 20).moved(Location((-10, -10, spec.gap)))
-    mortise = partner.cut(*SnapDimple(spec, mode=Mode.PRIVATE).solids())
-    tongue = SnapTongue(spec, mode=Mode.PRIVATE).solid().moved(Location((0, 0, -withdrawn)))
-    common = tongue.intersect(*solids_of(mortise))
-    return sum(solid.volume for solid in solids_of(common)) if common is not None else 0.0

@@ -1,11 +1,22 @@
-"""Primitive shapes as data, so that exact solids and meshes come from the same numbers."""
+"""Shapes as data, so that exact solids and meshes come from the same numbers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, radians, sin
 
-__all__ = ["Moved", "Point", "Prism", "Shape", "Turned", "box", "cylinder", "regular", "teardrop"]
+__all__ = [
+    "HalfPlan",
+    "Moved",
+    "Point",
+    "Prism",
+    "Shape",
+    "Turned",
+    "box",
+    "cylinder",
+    "regular",
+    "teardrop",
+]
 
 Point = tuple[float, float]
 Vector = tuple[float, float, float]
@@ -18,7 +29,7 @@ class Turned:
     Attributes
     ----------
     outline : tuple of (radius, z)
-        In mm, at least three corners, all radii at or above 0.
+        Corners in mm, at least three corners, all radii at or above 0.
     begin, turn : float
         First direction and angle of the turn in degrees, counter-clockwise from +x.
     """
@@ -35,11 +46,11 @@ class Prism:
     Attributes
     ----------
     outline : tuple of (x, y)
-        In mm, counter-clockwise.
+        Corners in mm, counter-clockwise.
     start, end : float
         z of the two flat ends in mm.
     holes : tuple of outlines
-        Inside the outline, clear of one another.
+        Corners in mm of holes inside the outline, clear of one another.
     """
 
     outline: tuple[Point, ...]
@@ -55,6 +66,7 @@ class Moved:
     Attributes
     ----------
     shape : Turned, Prism or Moved
+        The shape in its own frame.
     origin : (x, y, z)
         Where the shape's origin goes, in mm.
     z_dir, x_dir : (x, y, z)
@@ -76,18 +88,85 @@ class Moved:
 Shape = Turned | Prism | Moved
 
 
+@dataclass(frozen=True)
+class HalfPlan:
+    """One half as data: ``half = (web - carve) + add - bore``.
+
+    Attributes
+    ----------
+    carve : tuple of Shape
+        To cut from the body first, and from the web.
+    web : tuple of Shape
+        What joins the knuckles.
+    add : tuple of Shape
+        Knuckles, with their round bores and recesses.
+    bore : tuple of Shape
+        Cut from the finished half: roofs of bores, pockets, dimples, screw holes.
+    """
+
+    carve: tuple[Shape, ...]
+    web: tuple[Shape, ...]
+    add: tuple[Shape, ...]
+    bore: tuple[Shape, ...] = ()
+
+
 def cylinder(radius: float, start: float, end: float) -> Turned:
-    """Turn a plain cylinder on the z axis from `start` to `end` (mm)."""
+    """Turn a plain cylinder on the z axis.
+
+    Parameters
+    ----------
+    radius : float
+        Radius in mm.
+    start, end : float
+        Its two ends, z in mm.
+
+    Returns
+    -------
+    Turned
+        The cylinder.
+    """
     return Turned(((0.0, start), (radius, start), (radius, end), (0.0, end)))
 
 
 def box(west: float, east: float, south: float, north: float, start: float, end: float) -> Prism:
-    """Draw a box from its limits in x (west, east), y (south, north) and z (start, end), mm."""
+    """Draw a box from its limits.
+
+    Parameters
+    ----------
+    west, east : float
+        Limits in x, mm.
+    south, north : float
+        Limits in y, mm.
+    start, end : float
+        Limits in z, mm.
+
+    Returns
+    -------
+    Prism
+        The box.
+    """
     return Prism(((west, south), (east, south), (east, north), (west, north)), start, end)
 
 
 def regular(corners: int, across_flats: float, start: float, end: float, first: float) -> Prism:
-    """Draw a regular prism, such as a nut, with one corner in direction `first` (degrees)."""
+    """Draw a regular prism about the z axis, such as a nut.
+
+    Parameters
+    ----------
+    corners : int
+        Number of corners.
+    across_flats : float
+        Distance between opposite sides in mm.
+    start, end : float
+        Its two ends, z in mm.
+    first : float
+        Direction of one corner in degrees from +x.
+
+    Returns
+    -------
+    Prism
+        The prism.
+    """
     radius = 0.5 * across_flats / cos(radians(180.0 / corners))
     steps = (radians(first + 360.0 * i / corners) for i in range(corners))
     return Prism(tuple((radius * cos(a), radius * sin(a)) for a in steps), start, end)
@@ -99,11 +178,17 @@ def teardrop(radius: float, start: float, end: float, up: float) -> Prism:
     Parameters
     ----------
     radius : float
-        Of the bore in mm. The roof touches it at 45° on both sides and is cut flat at 1.2 radii.
+        Radius of the bore in mm. The roof touches it at 45° on both sides and is cut flat at 1.2
+        radii.
     start, end : float
-        Ends in z, mm.
+        Its two ends, z in mm.
     up : float
         Direction of printing in degrees from +x about the axis.
+
+    Returns
+    -------
+    Prism
+        What to cut besides the round bore.
     """
     flat = 1.2
     side, top = 0.5**0.5, 2.0**0.5 - flat

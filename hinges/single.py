@@ -20,12 +20,13 @@ from build123d import (
     Solid,
 )
 
-from .brep import build_all, build_half, build_shape, one_part, solids_of
 from .clearance import Clearance
-from .errors import HingeError
+from .exact_solids import build_all, build_half, build_shape, one_part, solids_of
+from .exceptions import HingeError
 from .leaf import Bracket, Leaf
+from .options import BoreStyle
 from .pins import Pin
-from .plan import SinglePlan, SingleSpec, plan_single
+from .plan_single import SinglePlan, SingleSpec, plan_single
 from .stops import Detents, Stops
 
 if TYPE_CHECKING:
@@ -69,15 +70,16 @@ def hinge_location(origin: VectorLike, along: VectorLike, outwards: VectorLike) 
     Parameters
     ----------
     origin : VectorLike
-        Middle of the edge.
+        Middle of the edge, in mm.
     along : VectorLike
-        Along the edge. The child's material is on the side ``outwards × along``.
+        Direction along the edge. The child's material is on the side ``outwards × along``.
     outwards : VectorLike
-        Out of the two bodies, in the face that they share.
+        Direction out of the two bodies, in the face that they share.
 
     Returns
     -------
     Location
+        Where the hinge's frame lies: z along the edge, y outwards.
 
     Raises
     ------
@@ -103,41 +105,41 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     length : float
-        Of the edge that the hinge is for, in mm.
+        Length in mm of the edge that the hinge is for.
     knuckles : int
-        2 or more, odd or even; the parent has the odd one.
+        Number of knuckles, 2 or more. With an odd count the parent has one more than the child.
     radius : float, optional
-        Of the barrel in mm. From the length, or from the pin, when left out.
+        Radius of the barrel in mm. It follows from the length, or from the pin, when left out.
     pin : Pin, optional
-        :class:`ConePin` (default), :class:`StraightPin`, :class:`FilamentPin`,
-        :class:`ScrewPin` or :class:`RodPin`.
+        What holds the knuckles: :class:`ConePin` (default), :class:`StraightPin`,
+        :class:`FilamentPin`, :class:`ScrewPin` or :class:`RodPin`.
     clearance : Clearance, float or str
-        A :class:`Clearance`, mm, a length such as "300 um", or a process: "fdm", "sla", "sls",
-        "mjf", "polyjet".
+        Room between surfaces that move past one another: a :class:`Clearance`, a number in mm, a
+        length such as "300 um", or a process: "fdm", "sla", "sls", "mjf", "polyjet".
     leaf : Bracket or Leaf, optional
         What joins the knuckles: a bar inside the body (default), or a door hinge's plate.
     gap : float, optional
-        Between the two bodies at 0° and 180° in mm; the radial clearance when left out.
+        Distance in mm between the two bodies at 0° and 180°; the radial clearance when left out.
     angle : float
-        The pose that it is drawn (and printed) in, degrees.
+        Angle in degrees at which it is drawn and printed.
     angular_range : (float, float)
-        In degrees, within 0 to 180.
+        Lowest and highest angle in degrees, within 0 to 180.
     stops : Stops or bool, optional
-        Heels at the ends of the range; True for one at the upper end.
+        Lugs at the ends of the range; True for one at the upper end.
     detents : Detents, optional
         Angles at which it clicks.
     chamfer : float
-        Of the barrel ends in mm.
+        Leg in mm of the 45° chamfer on the ends of barrels; 0 for none.
     margin : float, optional
-        Left free at both ends of the edge in mm. With a bracket, the barrel radius plus the
-        clearance, so that hinges on two edges that meet at a corner stay clear of one another;
-        with a leaf, 0.
+        Length in mm left free at each end of the edge. When left out, 0 with a leaf; with a bracket
+        the barrel radius plus the clearance, so that hinges on two edges that meet at a corner stay
+        clear of one another.
     wall : float, optional
-        Thinnest wall in mm; of the process named by `clearance`, or 0.8.
+        Thinnest wall in mm; of the process named by `clearance`, or 0.8, when left out.
     bore : {"round", "teardrop", "octagon"}
         Form of the bores. A hinge printed with its axis lying wants one of the last two.
     up : float
-        Direction of printing in degrees about the axis from +x; for the bores' roofs.
+        Direction of printing in degrees about the axis from +x, for the roofs of the bores.
     rotation, align, mode
         As for every build123d part. `align` is None, since the axis has to stay the origin.
 
@@ -148,9 +150,11 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
     parent_carve, child_carve : Part
         To cut from them first: ``body - carve + half``.
     hardware : Part or None
-        The loose pin, screw and nut.
+        The loose pin, screw and nut, for drawings; None for a printed pin.
     spec : SingleSpec
+        All parameters, defaults filled in.
     plan : SinglePlan
+        Every shape of the hinge as data.
 
     Raises
     ------
@@ -185,7 +189,7 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
         chamfer: float = 0.0,
         margin: float | None = None,
         wall: float | None = None,
-        bore: Literal["round", "teardrop", "octagon"] = "round",
+        bore: BoreStyle = "round",
         up: float = 90.0,
         rotation: RotationLike = (0, 0, 0),
         align: Align | tuple[Align, Align, Align] | None = None,
@@ -210,7 +214,7 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
             up=up,
         )
         plan_single(self.spec)
-        super().__init__(part=self.make_hinge(), rotation=rotation, align=align, mode=mode)
+        super().__init__(part=self._built(), rotation=rotation, align=align, mode=mode)
         self.label = "hinge"
         self.color = Color(*PARENT_COLOR)
         RevoluteJoint("hinge", self, axis=self._axis(), angular_range=self.spec.angular_range)
@@ -221,8 +225,8 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
         plane = Plane(Location() * turned)
         return Axis(plane.origin, plane.z_dir)
 
-    def make_hinge(self) -> Part:
-        """Build both halves in the drawn pose."""
+    def _built(self) -> Part:
+        """Both halves in the drawn pose."""
         return one_part(
             [
                 *_posed(self.spec, "parent", (_half(self.spec, "parent"),)).solids(),
@@ -287,7 +291,8 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
         Returns
         -------
         parent, child : Part
-            With the joints on the axis. Rigid and revolute joints that the bodies had are kept.
+            The bodies with their halves, and with the joints on the axis. Rigid and revolute joints
+            that the bodies had are kept.
 
         Raises
         ------
@@ -318,7 +323,15 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
 
 
 def keep_joints(body: Part | Solid, fitted: Part) -> None:
-    """Bind copies of a body's rigid and revolute joints to the part that it became."""
+    """Bind copies of a body's rigid and revolute joints to the part that it became.
+
+    Parameters
+    ----------
+    body : Part or Solid
+        The body as it was.
+    fitted : Part
+        The body with its half of the hinge.
+    """
     for label, joint in body.joints.items():
         if isinstance(joint, RigidJoint):
             RigidJoint(label, fitted, joint.location)
@@ -334,7 +347,9 @@ class HingeHalf(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     hinge : SingleHinge
+        The hinge that it is of.
     side : {"parent", "child"}
+        Which of the two bodies it is for.
     rotation, align, mode
         As for every build123d part.
     """
@@ -365,7 +380,9 @@ class HingeCarve(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     hinge : SingleHinge
+        The hinge that it is of.
     side : {"parent", "child"}
+        Which of the two bodies it is for.
     rotation, align, mode
         As for every build123d part; subtracted from the part under construction by default.
     """

@@ -1,6 +1,6 @@
 """End stops and detents: where a hinge ends its turn, and where it clicks.
 
-A stop is a heel on the child whose flat face meets the parent's face in one plane at the stop's
+A stop is a lug on the child whose flat face meets the parent's face in one plane at the stop's
 angle. A detent is a small cone on an end face of a parent's knuckle that drops into dimples of the
 child's knuckle; between two dimples it runs in a relieved track, and over the ridges beside each
 dimple it is pressed in by the interference.
@@ -9,62 +9,79 @@ dimple it is pressed in by the interference.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import asin, cos, degrees, pi, radians, sin, sqrt
+from math import asin, cos, degrees, radians, sin, sqrt
 
-from .errors import HingeError
+from .exceptions import HingeError
 from .fit import at_least, at_most
+from .knuckles import KnuckleLayout
 from .shapes import Moved, Point, Prism, Shape, Turned
-from .train import Train
 
 __all__ = ["Detents", "Stops"]
 
 
 @dataclass(frozen=True)
 class Stops:
-    """Heels that end the turn at the limits of its range.
+    """Lugs that end the turn at the limits of its range.
 
     Parameters
     ----------
     lower, upper : bool
-        Which ends of the range get a heel.
+        Whether the lower and the upper end of the range get a lug.
     reach : float, optional
-        Radius of the heel in mm; 2 mm more than the groove when left out.
+        Radius of the lug about the axis in mm; 2 mm more than the groove when left out.
     """
 
     lower: bool = False
     upper: bool = True
     reach: float | None = None
 
-    def radius(self, train: Train) -> float:
-        """Radius of the heel in mm."""
-        return train.reach + 2.0 if self.reach is None else self.reach
+    def _radius(self, layout: KnuckleLayout) -> float:
+        """Radius of the lug in mm."""
+        return layout.groove_radius + 2.0 if self.reach is None else self.reach
 
-    def clear_angle(self, train: Train, gap: float) -> float:
-        """How far from a stop (degrees) its face is one `gap` (mm) away at its nearest point."""
-        return degrees(asin(min(1.0, gap / train.reach)))
-
-    def heel(self, train: Train, angle: float, top: float, *, upper: bool) -> tuple[Shape, ...]:
-        """Draw one heel in the child's pose at angle 0.
+    def clear_angle(self, layout: KnuckleLayout, gap: float) -> float:
+        """Find the turn off a stop at which its face is one gap away at its nearest point.
 
         Parameters
         ----------
-        train : Train
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        gap : float
+            Distance between the two bodies in mm.
+
+        Returns
+        -------
+        float
+            Angle in degrees.
+        """
+        return degrees(asin(min(1.0, gap / layout.groove_radius)))
+
+    def lug(
+        self, layout: KnuckleLayout, angle: float, top: float, *, upper: bool
+    ) -> tuple[Shape, ...]:
+        """Draw one lug in the child's pose at angle 0.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
         angle : float
-            Of the stop in degrees.
+            Angle of the stop in degrees.
         top : float
-            From the axis to the faces that meet, in mm: the upper faces for the upper stop, the
-            shared faces for the lower.
+            Distance in mm from the axis to the faces that meet: the upper faces for the upper stop,
+            the shared faces for the lower.
         upper : bool
-            Which stop.
+            Whether it is the upper stop.
 
         Returns
         -------
         tuple of Shape
+            The lug, as long as the row of knuckles.
         """
-        far = self.radius(train)
+        far = self._radius(layout)
         opening = radians(180.0 - angle) if upper else radians(angle)
         # In a frame where the child's own face is y = -top and the material lies at x > 0, y < 0,
-        # the heel fills the wedge from that face up to the partner's face turned back.
+        # the lug fills the wedge from that face up to the partner's face turned back.
         first = asin(-top / far)
         last = opening - first
         count = max(2, int((last - first) / radians(10.0)) + 1)
@@ -73,22 +90,24 @@ class Stops:
         outline.append((-top * sin(opening), top * cos(opening)))
         if not upper:  # mirrored in the diagonal: the child's other face is x = +top
             outline = [(-y, -x) for x, y in outline][::-1]
-        return (Prism(tuple(outline), train.start, train.end),)
+        return (Prism(tuple(outline), layout.start, layout.end),)
 
-    def check(self, train: Train, faces: tuple[float, float], wall: float) -> None:
+    def check(self, layout: KnuckleLayout, faces: tuple[float, float], wall: float) -> None:
         """Refuse stops that have nothing to lean on.
 
         Parameters
         ----------
-        train : Train
-        faces : (upper, lower) float
-            How far the partner's faces reach from the axis, in mm.
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        faces : (float, float)
+            How far the parent's upper and shared face reach from the axis, in mm.
         wall : float
             Least height of the contact in mm.
 
         Raises
         ------
         FitError
+            If less than that of a face meets the lug.
         """
         reaches = ((self.upper, faces[0], "upper"), (self.lower, faces[1], "lower"))
         for wanted, far, name in reaches:
@@ -96,7 +115,7 @@ class Stops:
                 at_least(
                     "stop",
                     f"the height of the face that the {name} stop leans on",
-                    min(far, self.radius(train)) - train.reach,
+                    min(far, self._radius(layout)) - layout.groove_radius,
                     wall,
                     "use a wider bracket (deeper for the lower stop) or a larger stop reach",
                 )
@@ -109,7 +128,7 @@ class Detents:
     Parameters
     ----------
     angles : tuple of float
-        In degrees.
+        Where it clicks, in degrees.
     interference : float
         How deep the bump is pressed into the ridges, in mm.
     snug : float
@@ -119,7 +138,8 @@ class Detents:
         Width of the ridge on either side of a dimple in degrees; the rest of the track is
         relieved.
     strain : float
-        What the material bears again and again; 0.02 suits PETG, PP and nylon, 0.008 PLA.
+        Strain, as a share of 1, that the material bears again and again; 0.02 suits PETG, PP and
+        nylon, 0.008 PLA.
     """
 
     angles: tuple[float, ...]
@@ -139,23 +159,23 @@ class Detents:
                 "width above 0"
             )
 
-    def height(self, train: Train) -> float:
+    def _height(self, layout: KnuckleLayout) -> float:
         """How far the bump stands out of its face, in mm."""
-        return train.clearance.axial + self.interference
+        return layout.clearance.axial + self.interference
 
-    def foot(self, train: Train) -> float:
+    def _foot(self, layout: KnuckleLayout) -> float:
         """Radius of the bump at its foot in mm."""
-        return self._TIP + self._LEAN * self.height(train)
+        return self._TIP + self._LEAN * self._height(layout)
 
     def _room(self, normal: float) -> float:
         """Widen a flank by `normal` mm, measured in its radius."""
         return normal * sqrt(1.0 + self._LEAN**2)
 
-    def _dimple(self, train: Train, room: float) -> tuple[Point, ...]:
+    def _dimple(self, layout: KnuckleLayout, room: float) -> tuple[Point, ...]:
         """Draw a dimple about its own axis, which points into the face from the bump's face."""
-        height, axial = self.height(train), train.clearance.axial
+        height, axial = self._height(layout), layout.clearance.axial
         wide = self._room(room)
-        mouth = self.foot(train) - self._LEAN * axial + wide
+        mouth = self._foot(layout) - self._LEAN * axial + wide
         end = self._TIP + wide
         deep = height + room
         return (
@@ -166,25 +186,40 @@ class Detents:
             (0.0, deep),
         )
 
-    def circle(self, train: Train, core: float, chamfer: float) -> float:
+    def _pitch_radius(self, layout: KnuckleLayout, core: float, chamfer: float) -> float:
         """Radius of the circle on which bumps and dimples stand, in mm."""
-        return 0.5 * (core + train.radius - chamfer)
+        return 0.5 * (core + layout.radius - chamfer)
 
-    def faces(self, train: Train) -> tuple[tuple[float, float], ...]:
-        """Where bumps stand: plane z and direction along z, for the first holder's end."""
+    def _faces(self, layout: KnuckleLayout) -> tuple[tuple[float, float], ...]:
+        """Where bumps stand: plane z and direction along z, for the pin owner's first end."""
         return tuple(
-            (span.end, 1.0)
-            for span, after in zip(train.spans, train.spans[1:], strict=False)
-            if span.owner == train.holder and after.owner != train.holder
+            (knuckle.end, 1.0)
+            for knuckle, after in zip(layout.knuckles, layout.knuckles[1:], strict=False)
+            if knuckle.owner == layout.pin_owner and after.owner != layout.pin_owner
         )[:1]
 
-    def bumps(self, train: Train, core: float, chamfer: float) -> tuple[Shape, ...]:
-        """Draw the bumps on the parent, in its own direction 225°."""
-        circle, height = self.circle(train, core, chamfer), self.height(train)
+    def bumps(self, layout: KnuckleLayout, core: float, chamfer: float) -> tuple[Shape, ...]:
+        """Draw the bumps on the parent, in its own direction 225°.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        core : float
+            Largest radius that the pin takes, in mm.
+        chamfer : float
+            Leg of the chamfer on the ends of barrels in mm.
+
+        Returns
+        -------
+        tuple of Shape
+            What to add to the parent's half.
+        """
+        circle, height = self._pitch_radius(layout, core, chamfer), self._height(layout)
         outline = (
             (0.0, -0.2),
-            (self.foot(train), -0.2),
-            (self.foot(train), 0.0),
+            (self._foot(layout), -0.2),
+            (self._foot(layout), 0.0),
             (self._TIP, height),
             (0.0, height),
         )
@@ -195,49 +230,70 @@ class Detents:
                 (circle * cos(place), circle * sin(place), z),
                 (0.0, 0.0, direction),
             )
-            for z, direction in self.faces(train)
+            for z, direction in self._faces(layout)
         )
 
-    def hollows(
+    def dimple_cuts(
         self,
-        train: Train,
+        layout: KnuckleLayout,
         core: float,
         chamfer: float,
         drawn: float,
         limits: tuple[float, float],
     ) -> tuple[Shape, ...]:
-        """Draw the dimples and the relieved tracks in the child's pose at angle 0."""
-        circle = self.circle(train, core, chamfer)
+        """Draw the dimples and the relieved tracks in the child's pose at angle 0.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        core : float
+            Largest radius that the pin takes, in mm.
+        chamfer : float
+            Leg of the chamfer on the ends of barrels in mm.
+        drawn : float
+            Angle in degrees at which the hinge is drawn and printed.
+        limits : (float, float)
+            Lowest and highest angle of the hinge in degrees.
+
+        Returns
+        -------
+        tuple of Shape
+            What to cut from the child's half.
+        """
+        circle = self._pitch_radius(layout, core, chamfer)
         made: list[Shape] = []
-        for z, direction in self.faces(train):
+        for z, direction in self._faces(layout):
             for angle in sorted(self.angles):
-                room = train.clearance.radial if abs(angle - drawn) < 1e-6 else self.snug
+                room = layout.clearance.radial if abs(angle - drawn) < 1e-6 else self.snug
                 place = radians(225.0 - angle)
                 made.append(
                     Moved(
-                        Turned(self._dimple(train, room)),
+                        Turned(self._dimple(layout, room)),
                         (circle * cos(place), circle * sin(place), z),
                         (0.0, 0.0, direction),
                     )
                 )
-            for first, last in self._tracks(train, circle, limits, drawn):
-                made.append(self._track(train, circle, z, direction, first, last))
+            for first, last in self._tracks(layout, circle, limits, drawn):
+                made.append(self._track(layout, circle, z, direction, first, last))
         return tuple(made)
 
-    def _half_width(self, train: Train, circle: float, angle: float, drawn: float) -> float:
+    def _half_width(
+        self, layout: KnuckleLayout, circle: float, angle: float, drawn: float
+    ) -> float:
         """Half the angle that a dimple takes at its mouth, in degrees."""
-        room = train.clearance.radial if abs(angle - drawn) < 1e-6 else self.snug
-        return degrees(self._dimple(train, room)[1][0] / circle)
+        room = layout.clearance.radial if abs(angle - drawn) < 1e-6 else self.snug
+        return degrees(self._dimple(layout, room)[1][0] / circle)
 
     def _tracks(
-        self, train: Train, circle: float, limits: tuple[float, float], drawn: float
+        self, layout: KnuckleLayout, circle: float, limits: tuple[float, float], drawn: float
     ) -> list[tuple[float, float]]:
         """Ranges of hinge angle in which the bump runs free."""
-        own = degrees(self.foot(train) / circle)
+        own = degrees(self._foot(layout) / circle)
         blocks = sorted(
             (angle - side, angle + side)
             for angle in self.angles
-            for side in [self._half_width(train, circle, angle, drawn) + self.ridge]
+            for side in [self._half_width(layout, circle, angle, drawn) + self.ridge]
         )
         first = limits[0] - own
         tracks = []
@@ -248,49 +304,65 @@ class Detents:
         return tracks
 
     def _track(
-        self, train: Train, circle: float, z: float, direction: float, first: float, last: float
+        self,
+        layout: KnuckleLayout,
+        circle: float,
+        z: float,
+        direction: float,
+        first: float,
+        last: float,
     ) -> Shape:
-        room = train.clearance.axial
-        deep = self.height(train) + room
-        half = self.foot(train) + self._room(room)
+        room = layout.clearance.axial
+        deep = self._height(layout) + room
+        half = self._foot(layout) + self._room(room)
         outline = [(circle - half, z), (circle + half, z)]
         outline += [(circle + half, z + direction * deep), (circle - half, z + direction * deep)]
         return Turned(tuple(outline), 225.0 - last, last - first)
 
     def check(
-        self, train: Train, core: float, chamfer: float, web: float, limits: tuple[float, float]
+        self,
+        layout: KnuckleLayout,
+        core: float,
+        chamfer: float,
+        web: float,
+        limits: tuple[float, float],
     ) -> None:
         """Refuse detents that do not fit or that break the hinge.
 
         Parameters
         ----------
-        train : Train
+        layout : KnuckleLayout
+            The knuckles of the axis.
         core : float
-            Widest radius that the pin takes, in mm.
+            Largest radius that the pin takes, in mm.
         chamfer : float
-            Of the barrel ends in mm.
+            Leg of the chamfer on the ends of barrels in mm.
         web : float
             Thickness in mm of the bracket behind the groove.
-        limits : (low, high)
-            Range of the hinge in degrees.
+        limits : (float, float)
+            Lowest and highest angle of the hinge in degrees.
 
         Raises
         ------
         FitError
+            If a bump is too wide for its barrel, an angle lies outside the range, or the bracket is
+            bent too far.
         """
         at_least(
             "detent",
             "the free ring on the end face of a barrel",
-            train.radius - chamfer - core,
-            2.0 * self.foot(train),
+            layout.radius - chamfer - core,
+            2.0 * self._foot(layout),
             "use a wider barrel, a thinner pin, less interference or a smaller clearance",
         )
         for angle in self.angles:
             at_least("detent", "a detent's angle", angle, limits[0], "move it into the range", "°")
             at_most("detent", "a detent's angle", angle, limits[1], "move it into the range", "°")
-        bridge = min(span.length for span in train.spans if span.owner != train.holder)
-        bridge += 2.0 * train.clearance.axial
-        lever = train.radius
+        bridge = min(
+            knuckle.length for knuckle in layout.knuckles if knuckle.owner != layout.pin_owner
+        )
+        bridge += 2.0 * layout.clearance.axial
+        lever = layout.radius
         at_most(
             "strain",
             "the strain of the bracket as the bump is pressed over its ridge",
@@ -299,9 +371,3 @@ class Detents:
             "use less interference, longer knuckles or a tougher material",
             "%",
         )
-
-    def overlap(self, train: Train) -> float:
-        """Volume in mm³ that one bump is pressed into a ridge."""
-        deep = self.interference
-        foot = self._TIP + self._LEAN * deep
-        return pi * deep / 3.0 * (foot**2 + foot * self._TIP + self._TIP**2)

@@ -28,7 +28,7 @@ from fabfold.recipe.recipe import Recipe
 from fabfold.solid.closed_solid import Solid
 from fabfold.tree.catalogue import double_joints
 from fabfold.tree.kinematics_check import check_tree
-from hinges.errors import FitError
+from hinges.exceptions import FitError
 
 VOXEL, CLEARANCE = 20.0, 0.3
 PAIR = [[0, 0, 0], [1, 0, 0]]

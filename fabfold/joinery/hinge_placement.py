@@ -187,7 +187,7 @@ def _double(
     made: Fittings,
 ) -> None:
     """Place the pieces of one double hinge."""
-    from hinges.errors import HingeError
+    from hinges.exceptions import HingeError
 
     joint = f"the double hinge between voxels {edge.parent} and {edge.child}"
     first, second = edge.hinges

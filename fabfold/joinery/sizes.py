@@ -62,10 +62,10 @@ class HingeSize:
 
         Raises
         ------
-        hinges.errors.FitError
+        hinges.exceptions.FitError
             If it does not fit, with the rule that failed.
         """
-        from hinges.errors import FitError
+        from hinges.exceptions import FitError
         from hinges.mesh import double_hinge_meshes
 
         knuckles = 5 if second == "+y" else self.knuckles
@@ -146,7 +146,7 @@ def _first_fit(
     pin: float | None,
     knuckles: int | None,
 ) -> tuple[HingeSize | None, str]:
-    from hinges.errors import HingeError
+    from hinges.exceptions import HingeError
     from hinges.mesh import single_hinge_meshes
 
     reason = ""

@@ -29,8 +29,8 @@ def make_coupon(
     RecipeError
         If a value is wrong, or the hinges cannot be made with it.
     """
-    from hinges.coupon import DEFAULT_CLEARANCES, write_coupon
-    from hinges.errors import HingeError
+    from hinges.exceptions import HingeError
+    from hinges.tolerance_coupon import DEFAULT_CLEARANCES, write_coupon
 
     known = load_profile(profile or DEFAULT_PROFILE)
     values = DEFAULT_CLEARANCES

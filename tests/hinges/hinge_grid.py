@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import product
 
-from hinges.errors import HingeError
+from hinges.exceptions import HingeError
 from hinges.hardware import FilamentPin, RodPin, ScrewPin
 from hinges.pins import StraightPin
-from hinges.plan import SinglePlan, SingleSpec, plan_single
 from hinges.plan_double import EDGES, DoublePlan, DoubleSpec, plan_double
+from hinges.plan_single import SinglePlan, SingleSpec, plan_single
 
 VOXELS = (15.0, 20.0, 25.0, 30.0, 40.0)
 KNUCKLES = (2, 3, 4, 5, 6, 7)
@@ -39,6 +40,7 @@ def singles() -> list[Singles]:
     ]
 
 
+@cache
 def plan_of(case: Singles) -> SinglePlan | HingeError:
     """The plan of a case, or the refusal."""
     voxel, knuckles, pin, process, bore = case
@@ -60,6 +62,7 @@ def doubles() -> list[Doubles]:
     return list(product((20.0, 30.0, 40.0), EDGES, EDGES, turns, ("fdm", "sls")))
 
 
+@cache
 def double_plan_of(case: Doubles) -> DoublePlan | HingeError:
     """The plan of a case, or the refusal."""
     voxel, first, second, turns, process = case

@@ -7,16 +7,17 @@ from collections.abc import Sequence
 import manifold3d as m3
 import numpy as np
 
-from hinges.brep import build_half
-from hinges.mesh import half_of
-from hinges.plan import HalfPlan, SinglePlan
+from hinges.exact_solids import build_half
+from hinges.mesh import half_manifolds
 from hinges.plan_double import DoublePlan, child_pose, link_pose
+from hinges.plan_single import SinglePlan
+from hinges.shapes import HalfPlan
 
 SEGMENTS = 64
 
 
 def mesh_of(plan: HalfPlan) -> m3.Manifold:
-    return half_of(plan, SEGMENTS)[0]
+    return half_manifolds(plan, SEGMENTS)[0]
 
 
 def exact(plan: HalfPlan, name: str = "half"):
@@ -46,7 +47,7 @@ def block(size: float, west: float, gap_mm: float) -> m3.Manifold:
 
 
 def fitted(body: m3.Manifold, plan: HalfPlan) -> m3.Manifold:
-    half, carve = half_of(plan, SEGMENTS)
+    half, carve = half_manifolds(plan, SEGMENTS)
     return body - carve + half
 
 

@@ -1,19 +1,32 @@
-"""Hinges in CadQuery, and what is said about a broken environment."""
+"""Hinges in CadQuery."""
+
+import importlib
 
 import pytest
+from hinge_environment import needs_cadquery
 
-from hinges import HingeError, KernelError
-from hinges import kernel as kernel_module
+from hinges import HingeError
 
-cq = pytest.importorskip("cadquery", reason="CadQuery is not installed in this environment")
-plugin = pytest.importorskip("hinges.cadquery")
-
-
-def body(x):
-    return cq.Workplane().box(19.7, 19.7, 19.7).translate((x, -10, 0))
+pytestmark = needs_cadquery
 
 
-def test_methods_work_at_every_point_of_the_stack():
+@pytest.fixture(scope="module")
+def cq():
+    return importlib.import_module("cadquery")
+
+
+@pytest.fixture(scope="module")
+def plugin():
+    return importlib.import_module("hinges.cadquery")
+
+
+@pytest.fixture
+def body(cq, plugin):
+    """Make a box of 19.7 mm below y = 0, with its middle at a given x."""
+    return lambda x: cq.Workplane().box(19.7, 19.7, 19.7).translate((x, -10, 0))
+
+
+def test_methods_work_at_every_point_of_the_stack(cq, plugin):
     made = cq.Workplane("XZ").pushPoints([(0, 0), (60, 0), (0, 60)]).singleHinge(20, clearance=0.3)
     assert made.solids().size() == 6
     made = cq.Workplane().rarray(50, 50, 2, 2).doubleHinge(20, clearance=0.3)
@@ -22,7 +35,7 @@ def test_methods_work_at_every_point_of_the_stack():
     assert apart.size() == 2
 
 
-def test_bodies_keep_the_clearance():
+def test_bodies_keep_the_clearance(body):
     parent = body(-10).hingeParent(20, clearance=0.3)
     child = body(10).hingeChild(20, clearance=0.3)
     assert parent.solids().size() == child.solids().size() == 1
@@ -36,7 +49,7 @@ def test_bodies_keep_the_clearance():
         assert parent.val().distance(opened.val()) == pytest.approx(0.3, abs=1e-6)
 
 
-def test_two_hinges_on_one_body():
+def test_two_hinges_on_one_body(cq, plugin):
     long = cq.Workplane().box(19.7, 19.7, 80).translate((-10, -10, 0))
     both = long.pushPoints([cq.Location((0, 0, -25)), cq.Location((0, 0, 25))])
     made = both.hingeParent(20, clearance=0.3)
@@ -45,7 +58,7 @@ def test_two_hinges_on_one_body():
     assert made.val().Volume() != pytest.approx(one.val().Volume())
 
 
-def test_halves_and_cutters():
+def test_halves_and_cutters(body):
     cut = body(-10).cutHinge("parent", 20, clearance=0.3)
     fitted = cut.hingeHalf("parent", 20, clearance=0.3)
     direct = body(-10).hingeParent(20, clearance=0.3)
@@ -54,7 +67,7 @@ def test_halves_and_cutters():
         body(-10).cutHinge("left", 20)
 
 
-def test_plain_functions_for_invoke_and_apply():
+def test_plain_functions_for_invoke_and_apply(cq, plugin, body):
     parent = body(-10).invoke(plugin.parent_of(20, clearance=0.3))
     child = body(10).invoke(plugin.child_of(20, clearance=0.3))
     assert parent.val().distance(child.val()) == pytest.approx(0.3, abs=1e-6)
@@ -62,7 +75,7 @@ def test_plain_functions_for_invoke_and_apply():
     assert made.solids().size() == 4
 
 
-def test_shapes_pass_both_ways_without_a_copy():
+def test_shapes_pass_both_ways_without_a_copy(cq, plugin):
     from build123d import Box
 
     part = Box(1, 2, 3)
@@ -76,14 +89,12 @@ def test_shapes_pass_both_ways_without_a_copy():
         plugin.from_cadquery(cq.Workplane().rect(1, 1))
 
 
-def test_a_body_out_of_reach_is_refused():
+def test_a_body_out_of_reach_is_refused(body):
     with pytest.raises(HingeError, match="pieces instead of 1"):
         body(200).hingeParent(20)
 
 
-def test_no_name_is_overridden(monkeypatch):
-    import importlib
-
+def test_no_name_is_overridden(monkeypatch, cq, plugin):
     def mine(self):
         return "mine"
 
@@ -91,18 +102,3 @@ def test_no_name_is_overridden(monkeypatch):
     importlib.reload(plugin)
     assert cq.Workplane().singleHinge() == "mine"
     assert set(plugin.METHODS) >= {"singleHinge", "doubleHinge", "hingeParent", "hingeChild"}
-
-
-def test_an_overwritten_kernel_is_named_with_its_cure(monkeypatch):
-    versions = {"cadquery-ocp": "7.8.1.1", "cadquery-ocp-novtk": "8.0.1"}
-    monkeypatch.setattr(kernel_module, "_version", versions.get)
-    with pytest.raises(KernelError, match="overwritten") as caught:
-        kernel_module.check_kernel()
-    for hint in ("pip install", "build123d==0.10", "cadquery==2.7", "pip uninstall"):
-        assert hint in str(caught.value)
-
-
-def test_a_missing_cadquery_is_named(monkeypatch):
-    monkeypatch.setattr(kernel_module, "find_spec", lambda name: None)
-    with pytest.raises(KernelError, match="CadQuery is not installed"):
-        kernel_module.check_kernel(cadquery=True)

@@ -5,6 +5,7 @@ from itertools import combinations
 from pathlib import Path
 
 import pytest
+from hinge_environment import needs_cadquery
 
 HOME = Path(__file__).parents[2] / "examples" / "hinges"
 NAMES = sorted(path.stem for path in HOME.glob("[0-9]*.py"))
@@ -26,8 +27,13 @@ def test_examples_are_numbered():
     assert len(NAMES) >= 4
 
 
-def test_lidded_box_opens_and_closes():
-    box, lid = load("01_lidded_box_build123d").main()
+@pytest.fixture(scope="module")
+def lidded_box():
+    return load("01_lidded_box_build123d").main()
+
+
+def test_lidded_box_opens_and_closes(lidded_box):
+    box, lid = lidded_box
     assert len(box.solids()) == len(lid.solids()) == 1
     for angle in (0, 60, 120, 180):
         box.joints["hinge"].connect_to(lid.joints["hinge"], angle=angle)
@@ -35,10 +41,10 @@ def test_lidded_box_opens_and_closes():
     assert pytest.approx(36.3) == lid.bounding_box().max.Z
 
 
-def test_the_same_box_in_cadquery():
-    pytest.importorskip("cadquery", reason="CadQuery is not installed in this environment")
+@needs_cadquery
+def test_the_same_box_in_cadquery(lidded_box):
     box, lid = load("02_lidded_box_cadquery").main()
-    one, other = load("01_lidded_box_build123d").main()
+    one, other = lidded_box
     assert box.val().Volume() == pytest.approx(one.volume, rel=1e-6)
     assert lid.val().Volume() == pytest.approx(other.volume, rel=1e-6)
     assert box.val().distance(lid.val()) == pytest.approx(0.3, abs=1e-6)

@@ -19,8 +19,9 @@ from hinges import (
     Stops,
     StraightPin,
 )
+from hinges.barrel import default_radii
 from hinges.clearance import PROCESSES, millimetres
-from hinges.plan import SingleSpec, default_radii, plan_single
+from hinges.plan_single import SingleSpec, plan_single
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 from build123d import Box, BuildPart, Mode, Pos
 
 from hinges import FitError, HingeError, Magnet, MagnetPocket, SnapDimple, SnapSpec, SnapTongue
-from hinges.retention import STRAIN_LIMITS, insertion_overlap
+from hinges.retention import STRAIN_LIMITS
 
 
 def volume_of(shape):
@@ -53,6 +53,14 @@ def test_magnets_that_make_no_sense(wrong):
         Magnet(*wrong)
     with pytest.raises(HingeError, match="fit"):
         MagnetPocket(Magnet(5, 2), "glued", mode=Mode.PRIVATE)
+
+
+def insertion_overlap(spec, withdrawn):
+    """Volume in mm³ by which an unbent tongue, drawn out by some mm, overlaps its mortise."""
+    partner = Pos(0, 0, 10 + spec.gap) * Box(20, 20, 20)
+    mortise = partner - SnapDimple(spec, mode=Mode.PRIVATE)
+    tongue = Pos(0, 0, -withdrawn) * SnapTongue(spec, mode=Mode.PRIVATE)
+    return volume_of(tongue.solid().intersect(mortise.solid()))
 
 
 def test_the_tongue_is_free_when_closed_and_bends_on_its_way():

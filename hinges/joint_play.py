@@ -1,4 +1,4 @@
-"""How much a joint wobbles, from its clearances and its geometry.
+"""Play: how far a joint can shift and tilt, from its clearances and its geometry.
 
 Every pair of surfaces that face one another across a clearance gives linear constraints on a small
 motion of the child, ``u(p) = t + ω × p``: the gap at p may not close. Play is how far the child
@@ -16,13 +16,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import HingeError
-from .plan import HalfPlan, SinglePlan, SingleSpec, plan_single
+from .exceptions import HingeError
+from .plan_single import SinglePlan, SingleSpec, plan_single
+from .shapes import HalfPlan
 
 if TYPE_CHECKING:
+    from .double import DoubleHinge
     from .plan_double import DoublePlan
+    from .single import SingleHinge
 
-__all__ = ["Play", "chain", "play"]
+__all__ = ["Play", "play", "total_play"]
 
 Floats = NDArray[np.float64]
 _STEP = pi / 48.0
@@ -30,7 +33,7 @@ _STEP = pi / 48.0
 
 @dataclass(frozen=True)
 class Play:
-    """Play of a joint, or of a chain of joints.
+    """Play of a joint, or of several in a row.
 
     Attributes
     ----------
@@ -39,9 +42,9 @@ class Play:
     radial_least : float
         The same in the direction that allows least.
     axial : (float, float)
-        Shift along -z and +z in mm.
+        Largest shift along -z and +z in mm.
     tilt : float
-        Largest rocking of the child out of its plane, to one side, in degrees.
+        Largest tilt of the child out of its plane, to one side, in degrees.
     """
 
     radial: float
@@ -50,31 +53,43 @@ class Play:
     tilt: float
 
     def at(self, distance: float) -> float:
-        """Largest shift in mm of a point of the child at a `distance` in mm from the axis."""
+        """Compute the largest shift of a point of the child.
+
+        Parameters
+        ----------
+        distance : float
+            Distance of the point from the axis in mm.
+
+        Returns
+        -------
+        float
+            Shift in mm.
+        """
         return self.radial + distance * float(np.radians(self.tilt))
 
 
-def chain(links: Iterable[Play]) -> Play:
+def total_play(joints: Iterable[Play]) -> Play:
     """Add up the play of joints in a row, each at its worst.
 
     Parameters
     ----------
-    links : iterable of Play
+    joints : iterable of Play
+        Play of each joint.
 
     Returns
     -------
     Play
-        Of the last body against the first; shifts that a rocking joint adds over the length of a
-        link are not in it, see :meth:`Play.at`.
+        Play of the last body against the first. It leaves out the shifts that a tilting joint adds
+        over the length of a link; see :meth:`Play.at`.
 
     Raises
     ------
     HingeError
         If there is no joint.
     """
-    all_of = list(links)
+    all_of = list(joints)
     if not all_of:
-        raise HingeError("a chain needs at least one joint")
+        raise HingeError("a chain of joints needs at least one joint")
     return Play(
         sum(one.radial for one in all_of),
         sum(one.radial_least for one in all_of),
@@ -89,19 +104,20 @@ def contacts(plan: SinglePlan, angle: float) -> tuple[Floats, Floats, Floats]:
     Parameters
     ----------
     plan : SinglePlan
+        The hinge.
     angle : float
-        Of the hinge in degrees.
+        Angle of the hinge in degrees.
 
     Returns
     -------
     points : (n, 3) float64 array
-        In mm.
+        Points on the surfaces in mm.
     normals : (n, 3) float64 array
-        Direction in which the child closes the gap there.
+        Unit direction in which the child closes the gap at each.
     gaps : (n,) float64 array
-        In mm.
+        Width of the gap at each in mm.
     """
-    spec, train = plan.spec, plan.train
+    spec, layout = plan.spec, plan.layout
     circle = np.arange(0.0, 2.0 * pi, _STEP)
     points: list[Floats] = []
     normals: list[Floats] = []
@@ -115,28 +131,29 @@ def contacts(plan: SinglePlan, angle: float) -> tuple[Floats, Floats, Floats]:
         normals.append(normal[0] * rows + (0.0, 0.0, normal[1]))
         gaps.append(np.full(len(where), gap))
 
-    holder = train.holder
-    for ring in spec.pin.rings(train):
-        # the other's surface lies outside the holder's: a motion against the normal closes it
-        side = -1.0 if holder == 0 else 1.0
-        add(circle, ring.radius, ring.z, (side * ring.normal[0], side * ring.normal[1]), ring.gap)
-    _, far, top, bottom = spec.leaf.limits(train, spec.gap)
-    reach = train.reach
+    pin_owner = layout.pin_owner
+    for circled in spec.pin.contact_circles(layout):
+        # the other's surface lies outside the pin owner's: a motion against the normal closes it
+        side = -1.0 if pin_owner == 0 else 1.0
+        across, along = circled.normal
+        add(circle, circled.radius, circled.z, (side * across, side * along), circled.gap)
+    _, far, top, bottom = spec.leaf.limits(layout, spec.gap)
+    reach = layout.groove_radius
     low = -asin(min(1.0, bottom / reach))
     if far > 0.0:
         low = max(low, -acos(min(1.0, 0.5 * spec.gap / reach)))
     high = -asin(min(1.0, top / reach))
     count = max(2, int((high - low) / _STEP) + 1)
     arc = np.linspace(low, high, count)
-    for span in train.spans:
-        ends = (span.start, span.end)
+    for knuckle in layout.knuckles:
+        ends = (knuckle.start, knuckle.end)
         for z in ends:
-            if span.owner == 0:  # the parent's barrel in the child's groove
-                add(arc + np.radians(angle), train.radius, z, (-1.0, 0.0), spec.clearance.radial)
+            if knuckle.owner == 0:  # the parent's barrel in the child's groove
+                add(arc + np.radians(angle), layout.radius, z, (-1.0, 0.0), spec.clearance.radial)
             else:  # the child's barrel in the parent's
-                add(pi - arc, train.radius, z, (1.0, 0.0), spec.clearance.radial)
-    rims = (train.radius - spec.chamfer, spec.pin.reach(train, spec.roof))
-    for one, after in zip(train.spans, train.spans[1:], strict=False):
+                add(pi - arc, layout.radius, z, (1.0, 0.0), spec.clearance.radial)
+    rims = (layout.radius - spec.chamfer, spec.pin.largest_radius(layout, spec.bore_form))
+    for one, after in zip(layout.knuckles, layout.knuckles[1:], strict=False):
         direction = -1.0 if one.owner == 0 else 1.0
         for radius in rims:
             add(
@@ -144,25 +161,29 @@ def contacts(plan: SinglePlan, angle: float) -> tuple[Floats, Floats, Floats]:
                 radius,
                 0.5 * (one.end + after.start),
                 (0.0, direction),
-                train.clearance.axial,
+                layout.clearance.axial,
             )
     return np.concatenate(points), np.concatenate(normals), np.concatenate(gaps)
 
 
-def play(hinge: object, angle: float | None = None) -> Play:
-    """Work out the play of a single or double hinge.
+def play(
+    hinge: SingleHinge | DoubleHinge | SingleSpec | SinglePlan | DoublePlan,
+    angle: float | None = None,
+) -> Play:
+    """Compute the play of a single or double hinge.
 
     Parameters
     ----------
-    hinge : SingleHinge, DoubleHinge or SingleSpec
+    hinge : SingleHinge, DoubleHinge, or their plan or parameters
+        The hinge.
     angle : float, optional
-        Of a single hinge in degrees; the drawn pose when left out. What the two bodies lean on
-        changes with it.
+        Angle of a single hinge in degrees; the drawn pose when left out. What the two bodies lean
+        on changes with it.
 
     Returns
     -------
     Play
-        For a double hinge, of the child against the parent.
+        Play of the child against the parent.
 
     Raises
     ------
@@ -185,7 +206,7 @@ def play(hinge: object, angle: float | None = None) -> Play:
     if isinstance(plan, SinglePlan):
         return _single(plan, plan.spec.angle if angle is None else angle)
     if isinstance(plan, DoublePlan):
-        return chain(_single(one, 90.0) for one in _axes(plan))
+        return total_play(_single(one, 90.0) for one in _axes(plan))
     raise HingeError(f"play() takes a SingleHinge or a DoubleHinge, not {type(hinge).__name__}")
 
 
@@ -205,15 +226,17 @@ def _axes(plan: DoublePlan) -> list[SinglePlan]:
     )
     made = []
     for axis in (0, 1):
-        train = plan.trains[0 if spec.same_edge else axis]
+        layout = plan.layouts[0 if spec.same_edge else axis]
         if spec.same_edge:  # link, body, link: the knuckles on either side of one body's
             block = 2 * axis
-            where = [i for i, span in enumerate(train.spans) if span.owner == block]
-            kept = train.spans[where[0] - 1 : where[-1] + 2]
-            kept = tuple(replace(span, owner=0 if span.owner == block else 1) for span in kept)
-            train = replace(train, spans=kept)
+            where = [i for i, knuckle in enumerate(layout.knuckles) if knuckle.owner == block]
+            kept = layout.knuckles[where[0] - 1 : where[-1] + 2]
+            kept = tuple(
+                replace(knuckle, owner=0 if knuckle.owner == block else 1) for knuckle in kept
+            )
+            layout = replace(layout, knuckles=kept)
         none = HalfPlan((), (), ())
-        made.append(SinglePlan(like, train, 0.0, none, none, ()))
+        made.append(SinglePlan(like, layout, 0.0, none, none, ()))
     return made
 
 
@@ -230,28 +253,29 @@ def _single(plan: SinglePlan, angle: float) -> Play:
         binding = closing > 1e-9
         along.append(float(np.min(gaps[binding] / closing[binding])))
     directions = np.arange(0.0, 2.0 * pi, 4.0 * _STEP)
-    tilts = [rock(points, normals, gaps, float(direction))[1] for direction in directions]
+    tilts = [largest_tilt(points, normals, gaps, float(direction))[1] for direction in directions]
     return Play(max(shifts), min(shifts), (along[0], along[1]), degrees(max(tilts)))
 
 
-def rock(
+def largest_tilt(
     points: Floats, normals: Floats, gaps: Floats, direction: float
 ) -> tuple[tuple[float, float, float], float]:
-    """Rock the child as far as its contacts allow.
+    """Tilt the child as far as its contacts allow.
 
     Parameters
     ----------
-    points, normals, gaps
-        As :func:`contacts` gives them.
+    points, normals, gaps : float64 arrays
+        Contacts as :func:`contacts` gives them.
     direction : float
-        Of the axis that it rocks about, across the hinge's own, in radians from +x.
+        Direction, in radians from +x, of the axis that it tilts about; it is square to the hinge's
+        own.
 
     Returns
     -------
-    shift : (x, y, z)
-        Of the child's point at the origin in mm.
+    shift : (float, float, float)
+        How far the child's point at the origin moves with it, in mm.
     tilt : float
-        In radians.
+        Angle in radians.
 
     Raises
     ------
@@ -267,6 +291,6 @@ def rock(
         [0.0, 0.0, 0.0, -1.0], A_ub=rows, b_ub=gaps, bounds=[(None, None)] * 3 + [(0.0, None)]
     )
     if best.status != 0:
-        raise HingeError("nothing limits the rocking of this hinge: its two halves do not meet")
+        raise HingeError("nothing limits the tilt of this hinge: its two halves do not meet")
     x, y, z, tilt = (float(value) for value in best.x)
     return (x, y, z), tilt

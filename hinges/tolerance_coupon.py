@@ -1,16 +1,9 @@
 """The tolerance coupon: a plate of hinges at several clearances, to find what a printer needs.
 
 One row of single hinges and one of double hinges (two axes in a row) hang on one frame that carries
-their clearances in raised numbers. The plate prints lying, without support. A maker turns every
-flap and notes the smallest number whose flaps move freely.
-
-.. code-block:: text
-
-    write_coupon(path, clearances=DEFAULT_CLEARANCES, *, length_mm=20.0, wall_mm=0.8,
-                 title="Hinge coupon", guide=True) -> list of the written paths
-
-The suffix of `path` decides the format: .3mf, .step, .stp or .stl. With `guide`, a one-page PDF
-beside it, ``<name>-guide.pdf``, tells how to read it.
+their clearances in raised numbers. The plate prints lying, without support. One turns every flap
+and notes the smallest number whose flaps move freely. :func:`write_coupon` writes the plate for a
+slicer or for CAD, and a page that tells how to read it.
 """
 
 from __future__ import annotations
@@ -27,15 +20,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from build123d import Align, BasePartObject, Color, Mode, Part, Plane, Solid
 
-from .brep import build_half, build_shape, one_part, solids_of
 from .clearance import Clearance
-from .digits import number
-from .errors import FitError, HingeError
+from .digits import raised_number
+from .exact_solids import build_half, build_shape, one_part, solids_of
+from .exceptions import FitError, HingeError
 from .leaf import Leaf
-from .mesh import MeshPart, half_of, part_of, solid_of
-from .plan import HalfPlan, SinglePlan, SingleSpec, plan_single
+from .mesh import MeshPart, half_manifolds, manifold_of, mesh_part
 from .plan_double import Matrix
-from .shapes import Shape, box
+from .plan_single import SinglePlan, SingleSpec, plan_single
+from .shapes import HalfPlan, Shape, box
 
 if TYPE_CHECKING:
     from build123d import RotationLike
@@ -43,7 +36,9 @@ if TYPE_CHECKING:
 __all__ = ["DEFAULT_CLEARANCES", "Coupon", "write_coupon"]
 
 DEFAULT_CLEARANCES: Final[tuple[float, ...]] = (0.15, 0.20, 0.25, 0.30, 0.35, 0.40, 0.45, 0.50)
-"""In mm."""
+"""Clearances of a coupon in mm."""
+
+_COLUMNS = 3  # how many clearances the page shows
 
 _THICK = 1.9  # of frame, leaves and flaps, mm
 _SPINE = 14.0  # width of the frame, mm
@@ -53,8 +48,18 @@ _LINK = 12.0  # between the two axes of a double hinge, mm
 
 
 @dataclass(frozen=True)
-class Piece:
-    """One printed body: halves of hinges in their places, and plain shapes."""
+class CouponBody:
+    """One printed body of a coupon: halves of hinges in their places, and plain shapes.
+
+    Attributes
+    ----------
+    name : str
+        Name of the body, such as "link 0.30".
+    halves : tuple of (HalfPlan, (4, 4) float64 array)
+        Halves of hinges and the frames in mm that they are laid into.
+    shapes : tuple of Shape
+        Other shapes in mm: the frame's plate and its numbers.
+    """
 
     name: str
     halves: tuple[tuple[HalfPlan, Matrix], ...]
@@ -84,21 +89,21 @@ def _plan(clearance: float, length: float, width: float, wall: float) -> SingleP
     )
 
 
-def plan_coupon(clearances: Sequence[float], length: float, wall: float) -> tuple[Piece, ...]:
+def plan_coupon(clearances: Sequence[float], length: float, wall: float) -> tuple[CouponBody, ...]:
     """Plan every body of the coupon.
 
     Parameters
     ----------
     clearances : sequence of float
-        In mm, at most three digits each.
+        Clearances in mm, at most three digits each.
     length : float
-        Of each hinge in mm.
+        Length of each hinge in mm.
     wall : float
         Thinnest wall in mm.
 
     Returns
     -------
-    tuple of Piece
+    tuple of CouponBody
         The frame first, then a flap, a link and the link's flap for each clearance.
 
     Raises
@@ -116,7 +121,7 @@ def plan_coupon(clearances: Sequence[float], length: float, wall: float) -> tupl
     spine = box(-half, half, -0.5 * _SPINE, 0.5 * _SPINE, 0.0, _THICK)
     shapes: list[Shape] = [spine]
     halves: list[tuple[HalfPlan, Matrix]] = []
-    flaps: list[Piece] = []
+    flaps: list[CouponBody] = []
     for index, clearance in enumerate(clearances):
         x = start + index * pitch
         try:
@@ -131,7 +136,7 @@ def plan_coupon(clearances: Sequence[float], length: float, wall: float) -> tupl
                 "leave this clearance out, or use longer hinges",
                 error.unit,
             ) from error
-        level = first.spec.leaf.limits(first.train, first.spec.gap)[3]
+        level = first.spec.leaf.limits(first.layout, first.spec.gap)[3]
         near = 0.5 * _SPINE + _STAND
         single = _frame(x, -near, level, -1.0)
         lower = _frame(x, near, level, 1.0)
@@ -139,12 +144,12 @@ def plan_coupon(clearances: Sequence[float], length: float, wall: float) -> tupl
         halves += [(first.parent, single), (linked.parent, lower)]
         name = f"{clearance:.2f}"
         flaps += [
-            Piece(f"single {name}", ((first.child, single),)),
-            Piece(f"link {name}", ((linked.child, lower), (linked.parent, upper))),
-            Piece(f"double {name}", ((first.child, upper),)),
+            CouponBody(f"single {name}", ((first.child, single),)),
+            CouponBody(f"link {name}", ((linked.child, lower), (linked.parent, upper))),
+            CouponBody(f"double {name}", ((first.child, upper),)),
         ]
-        shapes += number(name, x, 0.0, _THICK)
-    return (Piece("frame", tuple(halves), tuple(shapes)), *flaps)
+        shapes += raised_number(name, x, 0.0, _THICK)
+    return (CouponBody("frame", tuple(halves), tuple(shapes)), *flaps)
 
 
 class Coupon(BasePartObject):  # type: ignore[misc]
@@ -155,9 +160,9 @@ class Coupon(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     clearances : sequence of float
-        In mm.
+        Clearances in mm, each only once.
     length : float
-        Of each hinge in mm.
+        Length of each hinge in mm.
     wall : float
         Thinnest wall in mm.
     rotation, align, mode
@@ -166,8 +171,9 @@ class Coupon(BasePartObject):  # type: ignore[misc]
     Attributes
     ----------
     clearances : tuple of float
+        The clearances in mm.
     names : tuple of str
-        Of the bodies, in the order of the solids.
+        Names of the bodies, in the order of the solids.
     meshes : tuple of MeshPart
         The bodies as meshes that never take room from a clearance.
 
@@ -195,24 +201,34 @@ class Coupon(BasePartObject):  # type: ignore[misc]
         mode: Mode = Mode.ADD,
     ) -> None:
         self.clearances = tuple(clearances)
-        self._pieces = plan_coupon(self.clearances, length, wall)
-        self.names = tuple(piece.name for piece in self._pieces)
-        super().__init__(part=self.make_coupon(), rotation=rotation, align=align, mode=mode)
+        self._bodies = plan_coupon(self.clearances, length, wall)
+        self.names = tuple(body.name for body in self._bodies)
+        super().__init__(part=self._built(), rotation=rotation, align=align, mode=mode)
         self.label = "hinge coupon"
         self.color = Color(0.2, 0.45, 0.7)
 
-    def make_coupon(self) -> Part:
+    def _built(self) -> Part:
         """Build every body."""
-        return one_part(coupon_solids(self._pieces))
+        return one_part(coupon_solids(self._bodies))
 
     @cached_property
     def meshes(self) -> tuple[MeshPart, ...]:
         """The bodies as meshes, in the order of `names`."""
-        return coupon_meshes(self._pieces)
+        return coupon_meshes(self._bodies)
 
 
-def coupon_solids(pieces: Sequence[Piece]) -> list[Solid]:
+def coupon_solids(bodies: Sequence[CouponBody]) -> list[Solid]:
     """Build every body exactly.
+
+    Parameters
+    ----------
+    bodies : sequence of CouponBody
+        The planned bodies.
+
+    Returns
+    -------
+    list of Solid
+        One a body, in mm.
 
     Raises
     ------
@@ -221,37 +237,45 @@ def coupon_solids(pieces: Sequence[Piece]) -> list[Solid]:
     """
     built: dict[HalfPlan, Solid] = {}
     solids = []
-    for piece in pieces:
-        parts = [build_shape(shape) for shape in piece.shapes]
-        for plan, matrix in piece.halves:
+    for body in bodies:
+        parts = [build_shape(shape) for shape in body.shapes]
+        for plan, matrix in body.halves:
             if plan not in built:
-                built[plan] = build_half(plan, piece.name).solid()
+                built[plan] = build_half(plan, body.name).solid()
             origin, x_dir, z_dir = (tuple(map(float, matrix[:3, k])) for k in (3, 0, 2))
             frame = Plane(origin=origin, x_dir=x_dir, z_dir=z_dir)
             parts.append(built[plan].moved(frame.location))
         whole = solids_of(parts[0].fuse(*parts[1:]) if len(parts) > 1 else parts[0])
         if len(whole) != 1:
-            raise HingeError(f"coupon: {piece.name} came out in {len(whole)} pieces")
+            raise HingeError(f"coupon: {body.name} came out in {len(whole)} pieces")
         solids += whole
     return solids
 
 
-def coupon_meshes(pieces: Sequence[Piece], segments: int = 64) -> tuple[MeshPart, ...]:
+def coupon_meshes(bodies: Sequence[CouponBody], segments: int = 64) -> tuple[MeshPart, ...]:
     """Build every body as a mesh.
+
+    Parameters
+    ----------
+    bodies : sequence of CouponBody
+        The planned bodies.
+    segments : int
+        Number of corners of a full circle.
 
     Returns
     -------
     tuple of MeshPart
+        One a body, in mm.
     """
     from manifold3d import Manifold, OpType
 
     made = []
-    for piece in pieces:
-        parts = [solid_of(shape, segments, outside=False) for shape in piece.shapes]
-        for plan, matrix in piece.halves:
-            parts.append(half_of(plan, segments)[0].transform(matrix[:3]))
+    for body in bodies:
+        parts = [manifold_of(shape, segments, outside=False) for shape in body.shapes]
+        for plan, matrix in body.halves:
+            parts.append(half_manifolds(plan, segments)[0].transform(matrix[:3]))
         whole = Manifold.batch_boolean(parts, OpType.Add) if len(parts) > 1 else parts[0]
-        made.append(part_of(whole))
+        made.append(mesh_part(whole))
     return tuple(made)
 
 
@@ -269,22 +293,23 @@ def write_coupon(
     Parameters
     ----------
     path : Path or str
-        Ends in .3mf, .step, .stp or .stl.
+        File to write; its suffix decides the format: .3mf, .step, .stp or .stl.
     clearances : sequence of float
-        In mm.
+        Clearances in mm, each only once.
     length_mm : float
-        Of each hinge.
+        Length of each hinge in mm.
     wall_mm : float
-        Thinnest wall.
+        Thinnest wall in mm.
     title : str
-        For the file's metadata and the page's head, such as the name of the profile.
+        Title for the file's metadata and the page's head, such as the name of the profile.
     guide : bool
-        Write the page too.
+        Whether to write a one-page PDF too, ``<name>-guide.pdf`` beside the file, that tells how to
+        read the coupon.
 
     Returns
     -------
     list of Path
-        What was written.
+        The files that were written.
 
     Raises
     ------
@@ -300,12 +325,12 @@ def write_coupon(
         raise HingeError(
             f"coupon file {target.name!r}: use a name that ends in {', '.join(sorted(writers))}"
         )
-    pieces = plan_coupon(clearances, length_mm, wall_mm)
+    bodies = plan_coupon(clearances, length_mm, wall_mm)
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".part-{target.name}")
     written = [target]
     try:
-        writer(part, pieces, title)
+        writer(part, bodies, title)
         part.replace(target)
     finally:
         part.unlink(missing_ok=True)
@@ -313,7 +338,8 @@ def write_coupon(
         page = target.with_name(f"{target.stem}-guide.pdf")
         part = page.with_name(f".part-{page.name}")
         try:
-            write_guide(part, tuple(clearances), coupon_meshes(pieces, 24), title)
+            columns = plan_coupon(clearances[:_COLUMNS], length_mm, wall_mm)
+            write_guide(part, tuple(clearances), one_part(coupon_solids(columns)), title)
             part.replace(page)
         finally:
             part.unlink(missing_ok=True)
@@ -321,39 +347,39 @@ def write_coupon(
     return written
 
 
-def _joined(pieces: Sequence[Piece]) -> MeshPart:
+def _joined(bodies: Sequence[CouponBody]) -> MeshPart:
     """All bodies in one mesh, so that no slicer moves them apart."""
     vertices, faces, count = [], [], 0
-    for mesh in coupon_meshes(pieces):
+    for mesh in coupon_meshes(bodies):
         vertices.append(mesh.vertices)
         faces.append(mesh.faces + count)
         count += len(mesh.vertices)
     return MeshPart(np.concatenate(vertices), np.concatenate(faces).astype(np.int32))
 
 
-def _write_3mf(path: Path, pieces: Sequence[Piece], title: str) -> None:
+def _write_3mf(path: Path, bodies: Sequence[CouponBody], title: str) -> None:
     import lib3mf
 
-    mesh = _joined(pieces)
+    mesh = _joined(bodies)
     wrapper = lib3mf.get_wrapper()
     model = wrapper.CreateModel()
     model.SetUnit(lib3mf.ModelUnit.MilliMeter)
     model.GetMetaDataGroup().AddMetaData("", "Title", title, "xs:string", True)
-    body = model.AddMeshObject()
-    body.SetName(title)
+    whole = model.AddMeshObject()
+    whole.SetName(title)
     corners = [lib3mf.Position(tuple(map(float, point))) for point in mesh.vertices]
     triangles = [lib3mf.Triangle(tuple(map(int, face))) for face in mesh.faces]
-    body.SetGeometry(corners, triangles)
+    whole.SetGeometry(corners, triangles)
     space = uuid.uuid5(uuid.NAMESPACE_URL, f"hinges/{title}")
-    body.SetUUID(str(uuid.uuid5(space, "coupon")))
-    item = model.AddBuildItem(body, wrapper.GetIdentityTransform())
+    whole.SetUUID(str(uuid.uuid5(space, "coupon")))
+    item = model.AddBuildItem(whole, wrapper.GetIdentityTransform())
     item.SetUUID(str(uuid.uuid5(space, "item")))
     model.SetBuildUUID(str(uuid.uuid5(space, "build")))
     model.QueryWriter("3mf").WriteToFile(str(path))
 
 
-def _write_stl(path: Path, pieces: Sequence[Piece], title: str) -> None:
-    mesh = _joined(pieces)
+def _write_stl(path: Path, bodies: Sequence[CouponBody], title: str) -> None:
+    mesh = _joined(bodies)
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
@@ -364,12 +390,12 @@ def _write_stl(path: Path, pieces: Sequence[Piece], title: str) -> None:
     path.write_bytes(head + struct.pack("<I", len(rows)) + rows.tobytes())
 
 
-def _write_step(path: Path, pieces: Sequence[Piece], title: str) -> None:
+def _write_step(path: Path, bodies: Sequence[CouponBody], title: str) -> None:
     from build123d import Compound, export_step
 
     named = []
-    for piece, solid in zip(pieces, coupon_solids(pieces), strict=True):
+    for body, solid in zip(bodies, coupon_solids(bodies), strict=True):
         own = deepcopy(solid)  # equal flaps share one shape in memory, and so would share a name
-        own.label = piece.name
+        own.label = body.name
         named.append(own)
     export_step(Compound(label=title, children=named), path, timestamp="2000-01-01T00:00:00")

@@ -6,15 +6,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .clearance import Clearance
-from .errors import HingeError
+from .exceptions import HingeError
 from .shapes import Point, Turned
 
-__all__ = ["Span", "Train", "groove", "lay_out"]
+__all__ = ["Knuckle", "KnuckleLayout", "groove", "lay_out_knuckles"]
 
 
 @dataclass(frozen=True)
-class Span:
-    """One knuckle: its owner (0 parent, 1 child or link, 2 ...) and its two end planes (z, mm)."""
+class Knuckle:
+    """One knuckle of a barrel.
+
+    Attributes
+    ----------
+    owner : int
+        Number of the body that it belongs to: 0 the parent, 1 the child or the link, 2 the child
+        where both axes of a double hinge lie on one edge.
+    start, end : float
+        Its two end planes along the axis, z in mm.
+    """
 
     owner: int
     start: float
@@ -27,76 +36,74 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Train:
+class KnuckleLayout:
     """All knuckles of one axis, in order along z.
 
     Attributes
     ----------
     radius : float
-        Of the barrels, in mm.
-    spans : tuple of Span
+        Radius of the barrels in mm.
+    knuckles : tuple of Knuckle
         Neighbours have different owners and the axial clearance between them.
     clearance : Clearance
-    holder : int
-        The owner that carries printed pins, and grips a loose one.
+        Room between the knuckles and what they turn in.
+    pin_owner : int
+        Number of the body that carries printed pins, and grips a loose one.
     """
 
     radius: float
-    spans: tuple[Span, ...]
+    knuckles: tuple[Knuckle, ...]
     clearance: Clearance
-    holder: int = 0
+    pin_owner: int = 0
 
     @property
     def start(self) -> float:
         """First end plane along z in mm."""
-        return self.spans[0].start
+        return self.knuckles[0].start
 
     @property
     def end(self) -> float:
         """Last end plane along z in mm."""
-        return self.spans[-1].end
+        return self.knuckles[-1].end
 
     @property
-    def reach(self) -> float:
+    def groove_radius(self) -> float:
         """Radius in mm of the groove that a barrel turns in."""
         return self.radius + self.clearance.radial
 
-    def owned(self, owner: int) -> tuple[Span, ...]:
-        """Knuckles of one owner."""
-        return tuple(span for span in self.spans if span.owner == owner)
 
-
-def lay_out(
+def lay_out_knuckles(
     length: float,
     count: int,
     radius: float,
     clearance: Clearance,
     margin: float,
     owners: Sequence[int] = (0, 1),
-    holder: int = 0,
-) -> Train:
+    pin_owner: int = 0,
+) -> KnuckleLayout:
     """Divide an edge among knuckles of equal length.
 
     Parameters
     ----------
     length : float
-        Of the edge in mm; it is centred on z = 0.
+        Length of the edge in mm; it is centred on z = 0.
     count : int
-        Knuckles, at least 2. With an odd count the parent has one more.
+        Number of knuckles, at least 2. With an odd count the parent has one more than the child.
     radius : float
-        Barrel radius in mm.
+        Radius of the barrel in mm.
     clearance : Clearance
-        The axial value stands between neighbours.
+        Room between the parts; the axial value stands between neighbours.
     margin : float
-        Left free at both ends of the edge, in mm.
+        Length in mm left free at each end of the edge.
     owners : sequence of int
-        Repeated over the knuckles: parent and child in turn by default.
-    holder : int
-        The owner that carries printed pins, and grips a loose one.
+        Owners of the knuckles, repeated along the edge: parent and child in turn by default.
+    pin_owner : int
+        Number of the body that carries printed pins, and grips a loose one.
 
     Returns
     -------
-    Train
+    KnuckleLayout
+        The knuckles in order along z.
 
     Raises
     ------
@@ -119,44 +126,46 @@ def lay_out(
         )
     first = -0.5 * length + margin
     pitch = each + clearance.axial
-    spans = tuple(
-        Span(owners[i % len(owners)], first + i * pitch, first + i * pitch + each)
+    knuckles = tuple(
+        Knuckle(owners[i % len(owners)], first + i * pitch, first + i * pitch + each)
         for i in range(count)
     )
-    return Train(radius, spans, clearance, holder)
+    return KnuckleLayout(radius, knuckles, clearance, pin_owner)
 
 
-def groove(train: Train, owner: int, core: float) -> Turned:
-    """What to cut out of the body of `owner` before its knuckles are added.
+def groove(layout: KnuckleLayout, owner: int, core: float) -> Turned:
+    """Plan what to cut out of the body of `owner` before its knuckles are added.
 
-    The barrels of the others need their radius plus the radial clearance over their spans plus the
-    axial clearance. Within its own spans the body gives up a core of radius `core`, so that no
-    material of the body fills a recess or bore of the knuckle that takes its place.
+    The barrels of the others need their radius plus the radial clearance over their lengths plus
+    the axial clearance. Within its own knuckles the body gives up a core of radius `core`, so that
+    no material of the body fills a recess or bore of the knuckle that takes its place.
 
     Parameters
     ----------
-    train : Train
+    layout : KnuckleLayout
+        The knuckles of the axis.
     owner : int
+        Number of the body that is cut.
     core : float
-        In mm, below the barrel radius.
+        Radius in mm, below that of the barrel.
 
     Returns
     -------
     Turned
         One stepped solid on the axis.
     """
-    axial = train.clearance.axial
+    axial = layout.clearance.axial
     outline: list[Point] = []
-    last = len(train.spans) - 1
-    for index, span in enumerate(train.spans):
-        if span.owner == owner:
-            outline += [(core, span.start), (core, span.end)]
+    last = len(layout.knuckles) - 1
+    for index, knuckle in enumerate(layout.knuckles):
+        if knuckle.owner == owner:
+            outline += [(core, knuckle.start), (core, knuckle.end)]
             continue
-        shared_before = index > 0 and train.spans[index - 1].owner != owner
-        shared_after = index < last and train.spans[index + 1].owner != owner
-        start = span.start - axial * (0.5 if shared_before else 1.0)
-        end = span.end + axial * (0.5 if shared_after else 1.0)
-        outline += [(train.reach, start), (train.reach, end)]
+        shared_before = index > 0 and layout.knuckles[index - 1].owner != owner
+        shared_after = index < last and layout.knuckles[index + 1].owner != owner
+        start = knuckle.start - axial * (0.5 if shared_before else 1.0)
+        end = knuckle.end + axial * (0.5 if shared_after else 1.0)
+        outline += [(layout.groove_radius, start), (layout.groove_radius, end)]
     corners: list[Point] = [(0.0, outline[0][1])]
     for corner in [*outline, (0.0, outline[-1][1])]:
         if corner[0] == corners[-1][0] and abs(corner[1] - corners[-1][1]) < 1e-9:

@@ -28,7 +28,7 @@ class FitError(HingeError):
     value, limit : float
         What the parameters give and what the rule asks for, in `unit`.
     unit : str
-        "mm", "deg" or "" for counts.
+        Unit of both: "mm", "°", "%" or "" for counts.
     advice : str
         What to change.
     """

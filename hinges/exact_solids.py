@@ -1,13 +1,12 @@
-"""Exact solids from planned shapes, through build123d's own interface only."""
+"""Exact solids of planned shapes, built with build123d's own interface only."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from .errors import HingeError
-from .plan import HalfPlan
-from .shapes import Moved, Prism, Shape
+from .exceptions import HingeError
+from .shapes import HalfPlan, Moved, Prism, Shape
 
 if TYPE_CHECKING:
     import build123d as bd
@@ -16,12 +15,17 @@ __all__ = ["build_all", "build_half", "build_shape", "one_part"]
 
 
 def build_shape(shape: Shape) -> bd.Solid:
-    """Build one primitive.
+    """Build one shape.
+
+    Parameters
+    ----------
+    shape : Turned, Prism or Moved
+        What to build, in mm.
 
     Returns
     -------
     Solid
-        In mm.
+        The exact solid in mm.
     """
     import build123d as bd
 
@@ -40,21 +44,54 @@ def build_shape(shape: Shape) -> bd.Solid:
 
 
 def solids_of(shape: bd.Shape | Iterable[bd.Shape]) -> list[bd.Solid]:
-    """List the solids of whatever a boolean operation gave."""
+    """List the solids of whatever a boolean operation gave.
+
+    Parameters
+    ----------
+    shape : Shape or iterable of Shape
+        One shape, or several.
+
+    Returns
+    -------
+    list of Solid
+        All solids in it, in their order.
+    """
     if hasattr(shape, "solids"):
         return list(shape.solids())
     return [solid for piece in shape for solid in piece.solids()]
 
 
 def one_part(solids: Sequence[bd.Solid]) -> bd.Part:
-    """Gather solids in one Part."""
+    """Gather solids in one part.
+
+    Parameters
+    ----------
+    solids : sequence of Solid
+        The solids, which are not united.
+
+    Returns
+    -------
+    Part
+        A part that holds them.
+    """
     import build123d as bd
 
     return bd.Part(list(solids))
 
 
 def build_all(shapes: Sequence[Shape]) -> bd.Part:
-    """Build shapes and unite them; neighbours that only touch stay apart."""
+    """Build shapes and unite them.
+
+    Parameters
+    ----------
+    shapes : sequence of Shape
+        What to build, in mm.
+
+    Returns
+    -------
+    Part
+        The united solids; neighbours that only touch stay apart.
+    """
     built = [build_shape(shape) for shape in shapes]
     if len(built) < 2:
         return one_part(built)
@@ -67,13 +104,14 @@ def build_half(plan: HalfPlan, name: str) -> bd.Part:
     Parameters
     ----------
     plan : HalfPlan
+        Shapes of the half, in mm.
     name : str
-        Of the half, for messages.
+        Name of the half, for messages.
 
     Returns
     -------
     Part
-        Exactly one valid solid.
+        The half: exactly one valid solid.
 
     Raises
     ------
