@@ -38,13 +38,13 @@ from hinges import (
 HOME = Path(__file__).parent / "hinges"
 BLUE, ORANGE, GREEN, GREY = (92, 143, 199), (242, 168, 82), (133, 189, 122), (184, 184, 191)
 UPRIGHT = View(
-    azimuth_deg=-55.0, elevation_deg=35.0, size=(330, 250), samples=3, lights=30, ground=False,
-    edges=0.9,
+    azimuth_deg=-55.0, elevation_deg=35.0, size=(330, 250), samples=2, lights=30, ground=False,
+    edges=1.0,
 )  # fmt: skip
 #: For hinges as they are drawn, their y upwards.
 LYING = replace(UPRIGHT, azimuth_deg=-60.0, elevation_deg=28.0)
 ALONG = replace(UPRIGHT, azimuth_deg=-90.0, elevation_deg=8.0)
-ACROSS = replace(UPRIGHT, azimuth_deg=15.0, elevation_deg=12.0)
+ACROSS = replace(UPRIGHT, azimuth_deg=24.0, elevation_deg=12.0)
 #: Turns y up: from the hinge's frame into the picture's.
 Y_UP = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
 

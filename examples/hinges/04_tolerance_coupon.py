@@ -18,7 +18,7 @@ def main() -> Coupon:
         found = play(SingleHinge(20, clearance=Clearance(clearance)), angle=60)
         print(
             f"{clearance:.2f} mm: plays {found.radial:.2f} mm across, {found.axial[1]:.2f} mm "
-            f"along, rocks {found.tilt:.1f}°"
+            f"along, tilts {found.tilt:.1f}°"
         )
     return coupon
 

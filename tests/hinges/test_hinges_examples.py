@@ -1,14 +1,19 @@
 """The numbered examples run, and what they make is sound."""
 
 import importlib.util
+import re
 from itertools import combinations
 from pathlib import Path
 
 import pytest
 from hinge_environment import needs_cadquery
 
-HOME = Path(__file__).parents[2] / "examples" / "hinges"
+ROOT = Path(__file__).parents[2]
+HOME = ROOT / "examples" / "hinges"
 NAMES = sorted(path.stem for path in HOME.glob("[0-9]*.py"))
+
+
+BLOCKS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "hinges.md").read_text("utf-8"), re.S)
 
 
 def load(name):
@@ -74,3 +79,17 @@ def test_coupon_with_clearances_of_ones_own(capsys):
     coupon = load("04_tolerance_coupon").main()
     assert len(coupon.solids()) == 10
     assert "0.30 mm: plays 0.42 mm across" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "block",
+    [pytest.param(b, marks=needs_cadquery if "cadquery" in b else ()) for b in BLOCKS],
+    ids=lambda block: block.splitlines()[-1][:30],
+)
+def test_blocks_of_the_page_run(block, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(block, names)
+    halves = [names[n] for n in ("box", "lid") if n in names]
+    for half in halves:
+        assert len(half.solids().vals() if hasattr(half, "vals") else half.solids()) == 1
