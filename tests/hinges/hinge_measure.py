@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import manifold3d as m3
 import numpy as np
@@ -16,10 +17,16 @@ from hinges.shapes import HalfPlan
 SEGMENTS = 64
 
 
+@cache
+def _manifolds(plan: HalfPlan) -> tuple[m3.Manifold, m3.Manifold]:
+    return half_manifolds(plan, SEGMENTS)
+
+
 def mesh_of(plan: HalfPlan) -> m3.Manifold:
-    return half_manifolds(plan, SEGMENTS)[0]
+    return _manifolds(plan)[0]
 
 
+@cache
 def exact(plan: HalfPlan, name: str = "half"):
     """The exact half; raises if it is not one valid solid."""
     return build_half(plan, name).solid()
@@ -47,7 +54,7 @@ def block(size: float, west: float, gap_mm: float) -> m3.Manifold:
 
 
 def fitted(body: m3.Manifold, plan: HalfPlan) -> m3.Manifold:
-    half, carve = half_manifolds(plan, SEGMENTS)
+    half, carve = _manifolds(plan)
     return body - carve + half
 
 
