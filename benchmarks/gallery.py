@@ -14,7 +14,7 @@ import json
 import shutil
 from pathlib import Path
 
-from fabfold.samples.catalogue import sample, sample_names
+from fabfold.samples.builtin import sample, sample_names
 
 ROOT = Path(__file__).resolve().parents[1]
 

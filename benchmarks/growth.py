@@ -48,7 +48,7 @@ def name_of(side: int) -> str:
 def do_solid(model: str, folder: Path) -> None:
     """In a process of its own too: CAD kernels and mesh repair take more memory than the rest."""
     from fabfold.kit.stage_files import save_solid
-    from fabfold.samples.catalogue import load_model
+    from fabfold.samples.builtin import load_model
     from fabfold.store import StageStore
 
     save_solid(StageStore(folder), load_model(model))

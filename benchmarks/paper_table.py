@@ -146,7 +146,7 @@ def main() -> None:
         print(json.dumps(run_one(source, template, Path(kit))))
         return
 
-    from fabfold.samples.catalogue import sample, sample_names
+    from fabfold.samples.builtin import sample, sample_names
 
     jobs = {n: (str(options.models / m[0]), m[1]) for n, m in MODELS.items()}
     jobs |= {f"sample:{n}": (f"sample:{n}", sample(n).template) for n in sample_names()}

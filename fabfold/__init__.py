@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from fabfold.lattice.shipped import load_template, template_names
     from fabfold.printing.profiles import load_profile, profile_names
     from fabfold.recipe.recipe import Recipe, read_recipe
-    from fabfold.samples.catalogue import load_model, sample_names
+    from fabfold.samples.builtin import load_model, sample_names
     from fabfold.tree.fold_tree import FoldTree
 
 __all__ = [
@@ -51,13 +51,13 @@ _HOME = {
     "Kit": "fabfold.kit.kit",
     "Motion": "fabfold.fold.motion",
     "Recipe": "fabfold.recipe.recipe",
-    "load_model": "fabfold.samples.catalogue",
+    "load_model": "fabfold.samples.builtin",
     "load_profile": "fabfold.printing.profiles",
     "load_template": "fabfold.lattice.shipped",
     "open_kit": "fabfold.kit.kit",
     "profile_names": "fabfold.printing.profiles",
     "read_recipe": "fabfold.recipe.recipe",
-    "sample_names": "fabfold.samples.catalogue",
+    "sample_names": "fabfold.samples.builtin",
     "template_names": "fabfold.lattice.shipped",
 }
 

@@ -18,7 +18,7 @@ from typing import Any
 _HOMES = {
     "Bracket": "leaf",
     "Clearance": "clearance",
-    "ConePin": "pins",
+    "ConePin": "printed_pins",
     "Coupon": "tolerance_coupon",
     "Detents": "stops",
     "DoubleHinge": "double",
@@ -41,7 +41,7 @@ _HOMES = {
     "SnapSpec": "retention",
     "SnapTongue": "retention",
     "Stops": "stops",
-    "StraightPin": "pins",
+    "StraightPin": "printed_pins",
     "hinge_location": "single",
     "play": "joint_play",
     "total_play": "joint_play",

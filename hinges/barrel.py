@@ -9,7 +9,8 @@ from .clearance import PROCESSES, Clearance
 from .exceptions import HingeError
 from .knuckles import lay_out_knuckles
 from .options import BarrelOptions
-from .pins import BoreForm, ConePin, Pin
+from .pins import BoreForm, Pin
+from .printed_pins import ConePin
 
 __all__ = ["BarrelSpec", "barrel_spec", "default_pin_radius", "default_radii", "wall_of"]
 

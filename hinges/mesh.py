@@ -39,9 +39,9 @@ from .barrel import default_pin_radius, default_radii
 from .clearance import Clearance
 from .leaf import Bracket
 from .options import BarrelKeywords
-from .pins import ConePin
 from .plan_double import DoubleSpec, plan_double, plate_shape
 from .plan_single import SingleSpec, plan_single
+from .printed_pins import ConePin
 from .shapes import HalfPlan, Moved, Prism, Shape
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import trimesh
 from fabfold.errors import ModelError
 from fabfold.lattice.shipped import load_template
 from fabfold.meshes import is_closed
-from fabfold.samples.catalogue import build_sample, load_model, mesh_sample, sample, sample_names
+from fabfold.samples.builtin import build_sample, load_model, mesh_sample, sample, sample_names
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.convert import to_manifold
 from fabfold.solid.scan import scan_mesh

@@ -188,7 +188,7 @@ def show_list(what: str) -> None:
     """
     console = Console()
     if what == "samples":
-        from fabfold.samples.catalogue import sample, sample_names
+        from fabfold.samples.builtin import sample, sample_names
 
         table = Table("sample", "template", "what it is", box=None)
         for known in map(sample, sample_names()):

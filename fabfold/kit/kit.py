@@ -144,7 +144,7 @@ class Kit:
     def solid(self) -> Solid:
         """Closed manifold of the model (repaired where it could be)."""
         from fabfold.kit.stage_files import load_solid, save_solid
-        from fabfold.samples.catalogue import load_model
+        from fabfold.samples.builtin import load_model
 
         def make(progress: Progress) -> Solid:
             progress.update(None, self.recipe.model)

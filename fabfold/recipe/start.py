@@ -74,7 +74,7 @@ def set_up_project(source: str, folder: Path | None, options: Mapping[str, Any])
     if path.suffix == ".toml":
         return _from_recipe(path, path.parent if folder is None else folder, given, template)
     if source.startswith("sample:"):
-        from fabfold.samples.catalogue import sample
+        from fabfold.samples.builtin import sample
 
         given.setdefault("template", sample(source.removeprefix("sample:")).template)
         return ProjectSetup(make_recipe(model=source, **given), None, template, folder)

@@ -7,9 +7,9 @@ from itertools import product
 
 from hinges.exceptions import HingeError
 from hinges.hardware import FilamentPin, RodPin, ScrewPin
-from hinges.pins import StraightPin
 from hinges.plan_double import EDGES, DoublePlan, DoubleSpec, plan_double
 from hinges.plan_single import SinglePlan, SingleSpec, plan_single
+from hinges.printed_pins import StraightPin
 
 VOXELS = (15.0, 20.0, 25.0, 30.0, 40.0)
 KNUCKLES = (2, 3, 4, 5, 6, 7)
