@@ -365,7 +365,7 @@ def _prove(
 
     from fabfold.errors import CheckError, GeometryError
     from fabfold.fold.motion import motion_of
-    from fabfold.kit.stages import Attempt
+    from fabfold.kit.stages import PlannedTree
     from fabfold.progress import SilentProgress
     from fabfold.proof.sampled import sample_path
     from fabfold.tree.fold_tree import FoldTree
@@ -378,15 +378,15 @@ def _prove(
     faults = check_tree(tree)
     if faults:
         return {"ok": False, "why": f"tree: {faults[0]}"}
-    attempt = Attempt(rounds.options[entry["option"]], tree, motion_of(tree, path))
+    planned = PlannedTree(rounds.options[entry["option"]], tree, motion_of(tree, path))
     try:
-        made = kit._build(attempt, kit.profile(), (), SilentProgress())
+        made = kit._build(planned, kit.profile(), (), SilentProgress())
     except (GeometryError, CheckError) as error:
         return {"ok": False, "why": str(error), "seconds": time.process_time() - start}
     certified = time.process_time()
-    joinery, motion = made.joinery, made.attempt.motion
+    joinery, motion = made.joinery, made.planned.motion
     seen = sample_path(
-        made.attempt.tree.to_json(joinery.voxel_mm, joinery.origin_mm),
+        made.planned.tree.to_json(joinery.voxel_mm, joinery.origin_mm),
         motion.to_json(),
         {body.name: (body.vertices, body.faces) for body in joinery.bodies},
         gap_step_deg=gap_step_deg,

@@ -64,17 +64,17 @@ def proven(voxels: Voxels, candidate: Candidate) -> str:
     """The certified gap of the bodies of a tree, or why there is none."""
     from fabfold.errors import FabfoldError
     from fabfold.fold.motion import motion_of
-    from fabfold.kit.stages import Attempt, build
+    from fabfold.kit.stages import PlannedTree, build
     from fabfold.printing.profiles import load_profile
     from fabfold.progress import SilentProgress
 
     profile = load_profile("sla-tough").model_copy(update={"clearance_mm": 0.3, "min_gap_mm": 0.25})
-    attempt = Attempt(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
+    planned = PlannedTree(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
     try:
-        made = build(attempt, profile, 20.0, (), SilentProgress())
+        made = build(planned, profile, 20.0, (), SilentProgress())
     except FabfoldError as error:
         return str(error)
-    return f"{made.attempt.motion.certificate['min_gap_mm']:.3f} mm"
+    return f"{made.planned.motion.certificate['min_gap_mm']:.3f} mm"
 
 
 def main() -> None:

@@ -21,7 +21,7 @@ def main(folder: str = "car-kit") -> None:
     )
 
     made = kit.join()
-    tree, motion = made.attempt.tree, made.attempt.motion
+    tree, motion = made.planned.tree, made.planned.motion
     print(f"{len(tree.bodies)} bodies hang on {len(tree.hinges)} hinges.")
     print(f"It folds in {len(motion.moves) - 1} moves.")
     print(f"On the way no two bodies come nearer than {motion.certificate['min_gap_mm']:.2f} mm.")

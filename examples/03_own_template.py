@@ -41,7 +41,7 @@ def main(folder: str = "stairs-kit") -> None:
 
     kit = Kit.from_model(ruler, template=str(template), folder=home, effort="quick")
     made = kit.join()
-    tree, motion = made.attempt.tree, made.attempt.motion
+    tree, motion = made.planned.tree, made.planned.motion
     print(f"The ruler is {len(tree.source)} voxels and bends at {len(tree.hinges)} hinges.")
     for number, moving in enumerate(motion.moves[1:], start=1):
         turned = motion.angles_deg[number] - motion.angles_deg[number - 1]

@@ -2,7 +2,8 @@
 
 A pin says how it shapes every knuckle, what it takes out of the bodies beside them, and whether
 the result can be printed. Printed pins (:mod:`hinges.printed_pins`) grow on the knuckles of the
-layout's pin owner, which is the parent of a single hinge. Loose ones (:mod:`hinges.hardware`) are put in after printing.
+layout's pin owner, which is the parent of a single hinge. Loose ones (:mod:`hinges.hardware`) are
+put in after printing.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from fabfold.joinery.pockets import grown_corners
 from fabfold.joinery.sizes import hinge_size, smallest_voxel
 from fabfold.joinery.tally import BuildTally
 from fabfold.kit.checking import run_checks
-from fabfold.kit.stages import Attempt, Made
+from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.kit.writing import write_kit
 from fabfold.printing.profiles import load_profile
 from fabfold.progress import SilentProgress
@@ -278,7 +278,9 @@ def kit(tmp_path_factory):
     voxels, motion, joinery = build(tree, profile.clearance_mm)
     meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     certificate = certify(tree, motion, meshes, VOXEL, joinery.origin_mm, profile.min_gap_mm)
-    made = Made(Attempt(voxels, tree, replace(motion, certificate=certificate)), joinery, ())
+    made = BuiltTree(
+        PlannedTree(voxels, tree, replace(motion, certificate=certificate)), joinery, ()
+    )
     checks = run_checks(made, profile, SilentProgress())
     folder = tmp_path_factory.mktemp("double")
     solid = Solid("arm", voxels.vertices * VOXEL, voxels.faces)

@@ -51,7 +51,7 @@ def test_the_bar_folds_into_the_box(bar_kit):
 
 
 def test_bodies_are_single_closed_pieces_as_many_as_in_the_tree(bar_kit):
-    tree = bar_kit.join().attempt.tree
+    tree = bar_kit.join().planned.tree
     paths = sorted((bar_kit.folder / "bodies").glob("*.stl"))
     assert [path.stem for path in paths] == sorted(body.name for body in tree.bodies)
     for path in paths:
@@ -76,7 +76,7 @@ def test_a_stage_done_is_read_not_made_again(bar_kit):
     again.listener = Refuse()
     assert again.recipe == bar_kit.recipe
     made, old = again.join(), bar_kit.join()
-    assert made.attempt.tree.to_json(20.0, (0, 0, 0)) == old.attempt.tree.to_json(20.0, (0, 0, 0))
+    assert made.planned.tree.to_json(20.0, (0, 0, 0)) == old.planned.tree.to_json(20.0, (0, 0, 0))
     assert made.joinery.notes == old.joinery.notes
     for one, other in zip(made.joinery.bodies, old.joinery.bodies, strict=True):
         np.testing.assert_array_equal(one.vertices, other.vertices)

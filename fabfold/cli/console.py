@@ -128,15 +128,15 @@ def _result_lines(kit: Kit, stage: str) -> list[str]:
                 f"smallest {voxels.fill.min():.0%}, {voxels.lost_volume:.1%} of the volume lost"
             )
         return lines
-    made = None if stage in ("fit", "fold") else kit.join()
-    attempt = kit.fold() if made is None else made.attempt
-    tree, motion = attempt.tree, attempt.motion
-    joinery = None if made is None else made.joinery
+    built = None if stage in ("fit", "fold") else kit.join()
+    planned = kit.fold() if built is None else built.planned
+    tree, motion = planned.tree, planned.motion
+    joinery = None if built is None else built.joinery
     lines.append(
         f"{len(tree.source)} voxels in {len(tree.bodies)} bodies, {len(tree.hinges)} hinges, "
         f"folding into {tree.template.name} in {len(motion.moves) - 1} moves"
     )
-    lines += [str(entry["text"]) for entry in kit.wish_report(attempt, joinery)]
+    lines += [str(entry["text"]) for entry in kit.wish_report(planned, joinery)]
     if motion.certificate:
         lines.append(f"smallest gap on the whole path {motion.certificate['min_gap_mm']:.3f} mm")
     if stage in ("check", "export"):

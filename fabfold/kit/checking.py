@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fabfold.kit.stages import Made
+from fabfold.kit.stages import BuiltTree
 from fabfold.printing.body_checks import check_bodies
 from fabfold.printing.checks import Check
 from fabfold.printing.profiles import Profile
@@ -26,12 +26,12 @@ CARVED_LIMIT = 5.0
 _OVERLAP_MM3 = 1e-3
 
 
-def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
+def run_checks(built: BuiltTree, profile: Profile, progress: Progress) -> list[Check]:
     """Check the tree, the certificate, the printed bodies, samples of the path and the replay.
 
     Parameters
     ----------
-    made : Made
+    built : BuiltTree
         The tree with its certificate, and its printed bodies.
     profile : Profile
         Limits of the printer and material.
@@ -43,7 +43,7 @@ def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
     list of Check
         Each with its figure, limit, unit and verdict.
     """
-    tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
+    tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
     faults = check_tree(tree)
     certificate = motion.certificate
     checks = [
@@ -73,11 +73,11 @@ def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
         ),
     ]
     if joinery.rounded_cells:
-        checks.append(_rounded(made))
+        checks.append(_rounded(built))
     progress.update(0.1, "printability")
     checks += check_bodies(joinery, tree, motion, profile, progress)
     progress.update(0.5, "every degree of the path")
-    checks += _sampled(made, profile)
+    checks += _sampled(built, profile)
     progress.update(0.8, "replay in MuJoCo")
     meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     report = replay(tree, motion, meshes, voxel_mm=joinery.voxel_mm, origin_mm=joinery.origin_mm)
@@ -103,9 +103,9 @@ def run_checks(made: Made, profile: Profile, progress: Progress) -> list[Check]:
     return checks
 
 
-def _rounded(made: Made) -> Check:
+def _rounded(built: BuiltTree) -> Check:
     """How much was carved so that cells pass each other."""
-    joinery = made.joinery
+    joinery = built.joinery
     lost = joinery.rounded_skin_mm3 + joinery.rounded_inside_mm3
     share = 100.0 * lost / (lost + sum(body.volume for body in joinery.bodies))
     return Check(
@@ -119,9 +119,9 @@ def _rounded(made: Made) -> Check:
     )
 
 
-def _sampled(made: Made, profile: Profile) -> list[Check]:
+def _sampled(built: BuiltTree, profile: Profile) -> list[Check]:
     """The second opinion on the path, by another library."""
-    tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
+    tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
     seen = sample_path(
         tree.to_json(joinery.voxel_mm, joinery.origin_mm),
         motion.to_json(),

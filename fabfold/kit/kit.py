@@ -1,6 +1,6 @@
 """A kit: the stages from a model to print-ready files, in memory or in a folder.
 
-Data flows one way: solid → voxels → candidates → attempt → made → checks → files. Each stage is
+Data flows one way: solid → voxels → candidates → planned tree → built tree → checks → files. Each stage is
 a method of :class:`Kit` that runs what is missing before it and returns a typed result. With a
 folder, every finished stage is kept there, and the same recipe goes on from what is done.
 """
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from fabfold.errors import CheckError, GeometryError, KitError, NoFoldError, RecipeError
 from fabfold.files import write_text
 from fabfold.kit import keys
-from fabfold.kit.stages import Attempt, Made, build
+from fabfold.kit.stages import BuiltTree, PlannedTree, build
 from fabfold.lattice.rotations import rotation_of_degrees
 from fabfold.lattice.template import Template
 from fabfold.progress import Listener, Progress, SilentListener
@@ -198,7 +198,7 @@ class Kit:
             return [self._picked().candidate]
         return [candidate for _, candidate in next(self._rounds().found())]
 
-    def fold(self) -> Attempt:
+    def fold(self) -> PlannedTree:
         """Best tree with the keyframes of its folding path on the lattice (paper section 5).
 
         Raises
@@ -206,20 +206,20 @@ class Kit:
         NoTreeError, NoFoldError
             If no round of the recipe finds one.
         """
-        from fabfold.kit.stage_files import load_attempt, save_attempt
+        from fabfold.kit.stage_files import load_planned, save_planned
 
-        def make(progress: Progress) -> Attempt:
-            attempt = next(self._attempts())
-            hinges, moves = len(attempt.tree.hinges), len(attempt.motion.moves) - 1
+        def make(progress: Progress) -> PlannedTree:
+            planned = next(self._planned_trees())
+            hinges, moves = len(planned.tree.hinges), len(planned.motion.moves) - 1
             progress.update(1.0, f"{hinges} hinges, {moves} moves")
-            return attempt
+            return planned
 
         key = keys.fold_key(self.recipe, self._template, self._mark())
         if not self._is_done("fold", key):
             self.fit()  # Ahead of this stage, so that the search shows its own progress.
-        return self._stage("fold", key, make, save_attempt, load_attempt)
+        return self._stage("fold", key, make, save_planned, load_planned)
 
-    def join(self) -> Made:
+    def join(self) -> BuiltTree:
         """Printed bodies of the best tree that survives on them, with the final certificate.
 
         Raises
@@ -227,16 +227,16 @@ class Kit:
         NoFoldError
             If every tree of every round was refused; it says why.
         """
-        from fabfold.kit.stage_files import load_made, save_made
+        from fabfold.kit.stage_files import load_built, save_built
 
         profile = self.profile()
         best = self.fold()
 
-        def make(progress: Progress) -> Made:
+        def make(progress: Progress) -> BuiltTree:
             refused: list[str] = []
-            for attempt in chain([best], islice(self._attempts(), 1, None)):
+            for planned in chain([best], islice(self._planned_trees(), 1, None)):
                 try:
-                    return build(attempt, profile, self.recipe.voxel_mm, tuple(refused), progress)
+                    return build(planned, profile, self.recipe.voxel_mm, tuple(refused), progress)
                 except (GeometryError, CheckError) as error:
                     refused.append(str(error))
                     progress.update(None, f"tree {len(refused)} refused: {error}")
@@ -247,7 +247,7 @@ class Kit:
             )
 
         key = keys.join_key(self.recipe, self._template, profile, self._mark())
-        return self._stage("join", key, make, save_made, load_made)
+        return self._stage("join", key, make, save_built, load_built)
 
     def check(self) -> list[Check]:
         """Checks of the printed bodies and the replay of the path, each with figure and limit."""
@@ -255,10 +255,10 @@ class Kit:
         from fabfold.kit.stage_files import load_checks, save_checks
 
         profile = self.profile()
-        made = self.join()
+        built = self.join()
 
         def make(progress: Progress) -> list[Check]:
-            checks = run_checks(made, profile, progress)
+            checks = run_checks(built, profile, progress)
             bad = [check for check in checks if not check.ok]
             progress.update(1.0, f"{len(checks) - len(bad)} of {len(checks)} passed")
             return checks
@@ -286,12 +286,12 @@ class Kit:
             raise KitError("where to? Give a folder to export to")
         require_free_folder(target)
         profile = self.profile()
-        made = self.join()
+        built = self.join()
         checks = self.check()
         with self.listener.stage("export") as progress:
             write_kit(
-                target, self.recipe, profile, self.solid(), made, checks, progress,
-                self.wish_report(made.attempt, made.joinery), self._template,
+                target, self.recipe, profile, self.solid(), built, checks, progress,
+                self.wish_report(built.planned, built.joinery), self._template,
             )  # fmt: skip
         if target != self.folder:
             if self._model is not None:
@@ -310,13 +310,13 @@ class Kit:
             writing.write_tree(self.folder, result[0].tree, self.recipe.voxel_mm)
             return
         if stage == "fold":
-            writing.write_attempt(self.folder, result, self.recipe.voxel_mm)
+            writing.write_planned(self.folder, result, self.recipe.voxel_mm)
             return
-        made = self.join()
-        writing.write_made(self.folder, made)
+        built = self.join()
+        writing.write_built(self.folder, built)
         if stage == "check":
-            wishes = self.wish_report(made.attempt, made.joinery)
-            writing.write_checks(self.folder, self.solid(), made, result, wishes)
+            wishes = self.wish_report(built.planned, built.joinery)
+            writing.write_checks(self.folder, self.solid(), built, result, wishes)
 
     # How the stages hang together ---------------------------------------------------------------
 
@@ -369,11 +369,13 @@ class Kit:
         result: Wishes = self._results["wishes"]
         return result
 
-    def wish_report(self, attempt: Attempt, joinery: Joinery | None = None) -> list[dict[str, Any]]:
+    def wish_report(
+        self, planned: PlannedTree, joinery: Joinery | None = None
+    ) -> list[dict[str, Any]]:
         """What became of each wish in a tree and its bodies: figures and a line of text."""
         from fabfold.kit.wish_report import wish_report
 
-        return wish_report(self.wishes(), attempt, joinery)
+        return wish_report(self.wishes(), planned, joinery)
 
     def pareto(self) -> list[Solution]:
         """Trees that fold of which none is better than another in every respect.
@@ -408,18 +410,18 @@ class Kit:
 
         return picked(self.pareto(), self.recipe.pick)
 
-    def _attempts(self) -> Iterator[Attempt]:
+    def _planned_trees(self) -> Iterator[PlannedTree]:
         """Every candidate of every round, best first, with its lattice path as a motion."""
         from fabfold.fold.motion import motion_of
 
         if self.recipe.pick:
             picked = self._picked()
             tree, path = picked.candidate.tree, picked.candidate.path
-            yield Attempt(picked.voxels, tree, motion_of(tree, path))
+            yield PlannedTree(picked.voxels, tree, motion_of(tree, path))
             return
         for pairs in self._rounds().found():
             for voxels, candidate in pairs:
-                yield Attempt(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
+                yield PlannedTree(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
 
     def _open_progress(self, name: str) -> AbstractContextManager[Progress]:
         """Progress of a stage that is about to be made; the recipe is written before the first."""

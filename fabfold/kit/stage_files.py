@@ -11,7 +11,7 @@ import numpy as np
 from fabfold.files import write_json, write_npz
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import BodyMesh, Joinery
-from fabfold.kit.stages import Attempt, Made
+from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.printing.checks import Check
 from fabfold.solid.closed_solid import Paint, Solid
 from fabfold.store import StageStore
@@ -20,15 +20,15 @@ from fabfold.voxels.voxel_files import load_voxels, save_voxels
 from fabfold.voxels.voxel_model import Voxels
 
 __all__ = [
-    "load_attempt",
+    "load_built",
     "load_checks",
-    "load_made",
     "load_options",
+    "load_planned",
     "load_solid",
-    "save_attempt",
+    "save_built",
     "save_checks",
-    "save_made",
     "save_options",
+    "save_planned",
     "save_solid",
 ]
 
@@ -72,41 +72,41 @@ def load_options(store: StageStore, files: list[str]) -> list[Voxels]:
     return [load_voxels(store.path(name)) for name in files]
 
 
-def save_attempt(store: StageStore, attempt: Attempt) -> list[str]:
+def save_planned(store: StageStore, planned: PlannedTree) -> list[str]:
     """Write the best tree, its voxels and its path on the lattice."""
     content = {
         "format": "fabfold-fold",
         "version": 1,
-        "tree": attempt.tree.to_json(1.0, (0.0, 0.0, 0.0)),
-        "motion": attempt.motion.to_json(),
+        "tree": planned.tree.to_json(1.0, (0.0, 0.0, 0.0)),
+        "motion": planned.motion.to_json(),
     }
     write_json(store.path("fold.json"), content)
-    save_voxels(store.path("fold-voxels.npz"), attempt.voxels)
+    save_voxels(store.path("fold-voxels.npz"), planned.voxels)
     return ["fold.json", "fold-voxels.npz"]
 
 
-def load_attempt(store: StageStore, files: list[str]) -> Attempt:
-    """Read what :func:`save_attempt` wrote."""
+def load_planned(store: StageStore, files: list[str]) -> PlannedTree:
+    """Read what :func:`save_planned` wrote."""
     data = json.loads(store.path("fold.json").read_text(encoding="utf-8"))
-    return Attempt(
+    return PlannedTree(
         load_voxels(store.path("fold-voxels.npz")),
         FoldTree.from_json(data["tree"]),
         Motion.from_json(data["motion"]),
     )
 
 
-def save_made(store: StageStore, made: Made) -> list[str]:
+def save_built(store: StageStore, built: BuiltTree) -> list[str]:
     """Write the tree that was built, its motion and its bodies."""
-    tree, joinery = made.attempt.tree, made.joinery
+    tree, joinery = built.planned.tree, built.joinery
     content = {
         "format": "fabfold-made",
         "version": 1,
         "tree": tree.to_json(joinery.voxel_mm, joinery.origin_mm),
-        "motion": made.attempt.motion.to_json(),
-        "refused": list(made.refused),
+        "motion": built.planned.motion.to_json(),
+        "refused": list(built.refused),
     }
     write_json(store.path("made.json"), content)
-    save_voxels(store.path("made-voxels.npz"), made.attempt.voxels)
+    save_voxels(store.path("made-voxels.npz"), built.planned.voxels)
     about: dict[str, Any] = {
         field.name: getattr(joinery, field.name)
         for field in dataclasses.fields(joinery)
@@ -121,10 +121,10 @@ def save_made(store: StageStore, made: Made) -> list[str]:
     return ["made.json", "made-voxels.npz", "made-bodies.npz"]
 
 
-def load_made(store: StageStore, files: list[str]) -> Made:
-    """Read what :func:`save_made` wrote."""
+def load_built(store: StageStore, files: list[str]) -> BuiltTree:
+    """Read what :func:`save_built` wrote."""
     data = json.loads(store.path("made.json").read_text(encoding="utf-8"))
-    attempt = Attempt(
+    planned = PlannedTree(
         load_voxels(store.path("made-voxels.npz")),
         FoldTree.from_json(data["tree"]),
         Motion.from_json(data["motion"]),
@@ -138,7 +138,7 @@ def load_made(store: StageStore, files: list[str]) -> Made:
             BodyMesh(str(arrays[f"name_{i}"][0]), arrays[f"vertices_{i}"], arrays[f"faces_{i}"])
             for i in range(count)
         )
-    return Made(attempt, Joinery(bodies=bodies, **about), tuple(data["refused"]))
+    return BuiltTree(planned, Joinery(bodies=bodies, **about), tuple(data["refused"]))
 
 
 def save_checks(store: StageStore, checks: list[Check]) -> list[str]:

@@ -14,11 +14,11 @@ from fabfold.voxels.voxel_model import Voxels
 if TYPE_CHECKING:
     from fabfold.printing.profiles import Profile
 
-__all__ = ["Attempt", "Made", "build"]
+__all__ = ["BuiltTree", "PlannedTree", "build"]
 
 
 @dataclass(frozen=True)
-class Attempt:
+class PlannedTree:
     """A tree with its path on the lattice: what the fold stage returns."""
 
     voxels: Voxels
@@ -27,12 +27,12 @@ class Attempt:
 
 
 @dataclass(frozen=True)
-class Made:
+class BuiltTree:
     """A tree that was built and certified: what the join stage returns.
 
     Attributes
     ----------
-    attempt : Attempt
+    planned : PlannedTree
         Voxels, tree, and the motion with its certificate on the real bodies.
     joinery : Joinery
         The printed bodies.
@@ -40,23 +40,23 @@ class Made:
         Why each better-ranked tree was passed over.
     """
 
-    attempt: Attempt
+    planned: PlannedTree
     joinery: Joinery
     refused: tuple[str, ...]
 
 
 def build(
-    attempt: Attempt,
+    planned: PlannedTree,
     profile: Profile,
     voxel_mm: float,
     refused: tuple[str, ...],
     progress: Progress,
-) -> Made:
+) -> BuiltTree:
     """Make the bodies of a tree, and certify its path on them.
 
     Parameters
     ----------
-    attempt : Attempt
+    planned : PlannedTree
         The tree, its voxels and its path on the lattice.
     profile : Profile
         Clearance of the hinges, and the gap to certify.
@@ -78,21 +78,21 @@ def build(
     from fabfold.proof.certify import certify
 
     joinery = build_bodies(
-        attempt.voxels,
-        attempt.tree,
-        attempt.motion,
+        planned.voxels,
+        planned.tree,
+        planned.motion,
         voxel_mm=voxel_mm,
         clearance_mm=profile.clearance_mm,
         progress=progress,
     )
     certificate = certify(
-        attempt.tree,
-        attempt.motion,
+        planned.tree,
+        planned.motion,
         [(body.vertices, body.faces) for body in joinery.bodies],
         voxel_mm=joinery.voxel_mm,
         origin_mm=joinery.origin_mm,
         min_gap_mm=profile.min_gap_mm,
         progress=progress,
     )
-    motion = replace(attempt.motion, certificate=certificate)
-    return Made(replace(attempt, motion=motion), joinery, refused)
+    motion = replace(planned.motion, certificate=certificate)
+    return BuiltTree(replace(planned, motion=motion), joinery, refused)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.joinery.bodies import Joinery
-from fabfold.kit.stages import Attempt
+from fabfold.kit.stages import PlannedTree
 from fabfold.voxels.region_cells import containing_voxels, to_lattice
 from fabfold.voxels.voxel_model import Voxels
 from fabfold.wishes.wish_list import Wishes
@@ -47,15 +47,15 @@ def printed_share(points: NDArray[np.float64], voxels: Voxels, joinery: Joinery)
 
 
 def wish_report(
-    wishes: Wishes, attempt: Attempt, joinery: Joinery | None = None
+    wishes: Wishes, planned: PlannedTree, joinery: Joinery | None = None
 ) -> list[dict[str, Any]]:
     """What became of each wish in a tree and its bodies: figures and a line of text."""
-    found = wishes.report(attempt.voxels, attempt.tree)
+    found = wishes.report(planned.voxels, planned.tree)
     if joinery is not None:
         entries = {entry["wish"]: entry for entry in found}
         for region in wishes.regions:
             points = np.concatenate(region.pieces)
-            share = printed_share(points, attempt.voxels, joinery)
+            share = printed_share(points, planned.voxels, joinery)
             entry = entries[f"protect {region.text}"]
             entry["printed"] = round(share, 4)
             entry["text"] += f"; grooves and gaps leave {share:.1%} of it"

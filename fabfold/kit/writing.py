@@ -17,7 +17,7 @@ from fabfold.export.step import write_step
 from fabfold.export.stl import write_stl
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.files import write_bytes, write_json, write_text
-from fabfold.kit.stages import Attempt, Made
+from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.lattice.template import Template
 from fabfold.printing.checks import Check
 from fabfold.printing.profiles import Profile
@@ -30,19 +30,21 @@ from fabfold.version import __version__
 
 __all__ = [
     "kit_summary",
-    "write_attempt",
+    "write_built",
     "write_checks",
     "write_kit",
-    "write_made",
     "write_pareto",
+    "write_planned",
     "write_tree",
 ]
 
 
-def kit_summary(solid: Solid, made: Made, wishes: Sequence[dict[str, Any]] = ()) -> dict[str, Any]:
+def kit_summary(
+    solid: Solid, built: BuiltTree, wishes: Sequence[dict[str, Any]] = ()
+) -> dict[str, Any]:
     """Figures of a kit for its report: counts, volumes, energies (JSON-ready)."""
-    tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
-    voxels = made.attempt.voxels
+    tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
+    voxels = built.planned.voxels
     return {
         "model": solid.name,
         "repairs": list(solid.notes),
@@ -68,7 +70,7 @@ def kit_summary(solid: Solid, made: Made, wishes: Sequence[dict[str, Any]] = ())
         "struts": joinery.struts,
         "volume_mm3": round(sum(body.volume for body in joinery.bodies), 1),
         "notes": list(joinery.notes),
-        "refused_trees": list(made.refused),
+        "refused_trees": list(built.refused),
         **({"wishes": list(wishes)} if wishes else {}),
     }
 
@@ -79,10 +81,10 @@ def write_tree(folder: Path, tree: FoldTree, voxel_mm: float) -> None:
     write_json(folder / "tree.json", tree.to_json(voxel_mm, (0.0, 0.0, 0.0)))
 
 
-def write_attempt(folder: Path, attempt: Attempt, voxel_mm: float) -> None:
+def write_planned(folder: Path, planned: PlannedTree, voxel_mm: float) -> None:
     """Write ``tree.json`` and ``motion.json`` of a tree that is not built yet."""
-    write_tree(folder, attempt.tree, voxel_mm)
-    write_json(folder / "motion.json", attempt.motion.to_json())
+    write_tree(folder, planned.tree, voxel_mm)
+    write_json(folder / "motion.json", planned.motion.to_json())
 
 
 def write_pareto(folder: Path, found: Sequence[Solution], progress: Progress) -> None:
@@ -98,23 +100,23 @@ def write_pareto(folder: Path, found: Sequence[Solution], progress: Progress) ->
     write_json(folder / "pareto.json", content)
 
 
-def write_made(folder: Path, made: Made) -> None:
+def write_built(folder: Path, built: BuiltTree) -> None:
     """Write ``tree.json``, ``motion.json`` and ``bodies/`` of a tree that was built."""
-    tree, joinery = made.attempt.tree, made.joinery
+    tree, joinery = built.planned.tree, built.joinery
     write_json(folder / "tree.json", tree.to_json(joinery.voxel_mm, joinery.origin_mm))
-    write_json(folder / "motion.json", made.attempt.motion.to_json())
+    write_json(folder / "motion.json", built.planned.motion.to_json())
     write_stl(folder / "bodies", joinery)
 
 
 def write_checks(
     folder: Path,
     solid: Solid,
-    made: Made,
+    built: BuiltTree,
     checks: list[Check],
     wishes: Sequence[dict[str, Any]] = (),
 ) -> None:
     """Write ``report.json`` and ``report.html``; `wishes` tells what became of each wish."""
-    write_report(folder, checks, kit_summary(solid, made, wishes))
+    write_report(folder, checks, kit_summary(solid, built, wishes))
 
 
 def write_kit(
@@ -122,7 +124,7 @@ def write_kit(
     recipe: Recipe,
     profile: Profile,
     solid: Solid,
-    made: Made,
+    built: BuiltTree,
     checks: list[Check],
     progress: Progress,
     wishes: Sequence[dict[str, Any]] = (),
@@ -140,7 +142,7 @@ def write_kit(
         Printer and material, named in the 3MF.
     solid : Solid
         The model; its repairs are told in the report.
-    made : Made
+    built : BuiltTree
         Tree, motion with certificate, and printed bodies.
     checks : list of Check
         Every check, passed or failed.
@@ -151,12 +153,12 @@ def write_kit(
     template : Template, optional
         The target as it is filled; one with creases is also written as it lies flat.
     """
-    tree, motion, joinery = made.attempt.tree, made.attempt.motion, made.joinery
+    tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
     name = recipe.name
     colours = body_colours(tree)
     write_text(folder / "kit.toml", recipe.to_toml())
     progress.update(0.1, "bodies as STL")
-    write_made(folder, made)
+    write_built(folder, built)
     progress.update(0.2, "3MF")
     write_3mf(
         folder / f"{name}.3mf",
@@ -186,8 +188,8 @@ def write_kit(
     progress.update(0.8, "animation")
     write_glb(folder / "fold.glb", joinery, tree, motion, title=name, colours=colours)
     progress.update(0.85, "picture")
-    upright = made.attempt.voxels.rotation.T
+    upright = built.planned.voxels.rotation.T
     write_strip(folder / "fold.png", joinery, tree, motion, colours=colours, upright=upright)
     progress.update(0.95, "report")
-    write_checks(folder, solid, made, checks, wishes)
+    write_checks(folder, solid, built, checks, wishes)
     progress.update(1.0, str(folder))
