@@ -48,8 +48,8 @@ def main() -> None:
         if options.only and options.only not in name:
             continue
         kit = Kit.from_model("sample:car", effort="quick", seed=1, **wishes)
-        attempt = kit.fold()
-        tree, voxels, solid = attempt.tree, attempt.voxels, kit.solid()
+        planned = kit.fold()
+        tree, voxels, solid = planned.tree, planned.voxels, kit.solid()
         keep = Keep(FRONT, sample_surface(solid, 0), int((FACES == [1, 0, 0]).all(axis=1).argmax()))
         (kept,) = Wishes(keeps=(keep,)).kept(voxels, tree)
         parts = []

@@ -1,8 +1,8 @@
 """A kit: the stages from a model to print-ready files, in memory or in a folder.
 
-Data flows one way: solid → voxels → candidates → planned tree → built tree → checks → files. Each stage is
-a method of :class:`Kit` that runs what is missing before it and returns a typed result. With a
-folder, every finished stage is kept there, and the same recipe goes on from what is done.
+Data flows one way: solid → voxels → candidates → planned tree → built tree → checks → files. Each
+stage is a method of :class:`Kit` that runs what is missing before it and returns a typed result.
+With a folder, finished stages are kept there, and the same recipe goes on from what is done.
 """
 
 from __future__ import annotations
