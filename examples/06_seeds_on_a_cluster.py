@@ -2,9 +2,9 @@
 
     python examples/06_seeds_on_a_cluster.py [FOLDER]
 
-Every seed of a search is a task of its own, and Dask can run it on any machine. Here the cluster is
-two processes on this one; with ``scheduler="tcp://HOST:8786"`` it is a room full of computers. The
-answer is the same. Install it with ``pip install 'fabfold[cluster]'``.
+A search has many tasks that know nothing of each other, and Dask can run them on any machine. Here
+the cluster is two processes on this one; with ``scheduler="tcp://HOST:8786"`` it is a room full of
+computers. The result is the same. ``pip install 'fabfold[cluster]'`` installs what it needs.
 """
 
 import sys
@@ -21,32 +21,35 @@ SEEDS = (1, 2, 3)
 def main(folder: str = "seeds") -> None:
     home = Path(folder)
     home.mkdir(parents=True, exist_ok=True)
-    bar = home / "bar.stl"
-    trimesh.creation.box((120.0, 20.0, 10.0)).export(bar)
+    beam = home / "beam.stl"
+    trimesh.creation.box((90.0, 20.0, 20.0)).export(beam)
 
-    kits = {}
+    # Workers with one thread each: a search keeps a process busy.
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        for seed in SEEDS:
-            kit = Kit.from_model(
-                bar,
-                template="box-2x3x4",
+        kits = [
+            Kit.from_model(
+                beam,
+                template="box-3x3x4",
                 effort="quick",
+                rotation=(0, 0, 0),  # the same 36 voxels for all, see example 02
+                origin=(0, 5, 5),
+                pitch=10,
                 seed=seed,
                 scheduler=cluster.scheduler_address,
             )
-            best = kit.fit()[0]  # each seed of a recipe begins a round of four on the cluster
+            for seed in SEEDS
+        ]
+        for kit in kits:
+            tree = kit.fold().tree
             print(
-                f"seed {seed}: {len(best.tree.hinges)} hinges, "
-                f"surface {best.energy['surface']:.2f}, energy {best.energy['total']:.2f}"
+                f"seed {kit.recipe.seed}: {len(tree.source)} voxels, {len(tree.hinges)} hinges, "
+                f"energy {tree.energy['total']:.3f}"
             )
-            kits[best.energy["total"], seed] = kit
 
-    # The lower the energy, the fewer the hinges and the smoother the box.
-    _, seed = min(kits)
-    kit = kits[min(kits)]
-    kit.scheduler = None
-    where = kit.export(home / f"bar-kit-{seed}")
-    print(f"The kit of seed {seed} is in {where}.")
+        # The lower the energy, the fewer the hinges and the smoother the box.
+        best = min(kits, key=lambda kit: kit.fold().tree.energy["total"])
+        where = best.export(home / f"beam-kit-{best.recipe.seed}")
+        print(f"The kit of seed {best.recipe.seed} is the best; it is in {where}.")
 
 
 if __name__ == "__main__":
