@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.fold.carving_plan import Carving, plan_carving, skin_of
-from fabfold.fold.clashes import Meeting
+from fabfold.fold.carving_plan import CarvingPlan, plan_carving, skin_of
+from fabfold.fold.clashes import Clash
 from fabfold.fold.motion import Motion, quarter_path
 from fabfold.joinery.cells import eroded_cells, occupancy
 from fabfold.tree.fold_tree import FoldTree
@@ -135,7 +135,7 @@ def carve(
             f"{names[0]} and {names[1]} run into each other on the folding path, and carving "
             "would cut through a hinge"
         )
-    if not planned.meetings:
+    if not planned.clashes:
         return Carved()
     return _Bench(voxels, tree, model, halves, voxel_mm, clearance_mm).work(planned)
 
@@ -203,10 +203,10 @@ class _Bench:
         self.start: dict[int, manifold3d.Manifold] = {}
         self._whole: dict[int, manifold3d.Manifold] = {}
 
-    def work(self, planned: Carving) -> Carved:
+    def work(self, planned: CarvingPlan) -> Carved:
         """Carve all meetings in order."""
         out = Carved()
-        for meeting, bounds in zip(planned.meetings, planned.rings, strict=True):
+        for meeting, bounds in zip(planned.clashes, planned.rings, strict=True):
             self._carve(meeting, float(bounds[0]), float(bounds[1]), out)
         self._count(out)
         return out
@@ -243,7 +243,7 @@ class _Bench:
         parts += [_worked_out(half ^ box) for half, _ in self.halves[int(self.body[voxel])]]
         return [part for part in parts if not part.is_empty()]
 
-    def _carve(self, meeting: Meeting, low: float, high: float, out: Carved) -> None:
+    def _carve(self, meeting: Clash, low: float, high: float, out: Carved) -> None:
         frames = [to.copy() for to in (meeting.to_first, meeting.to_second)]
         for to in frames:
             to[:, 3] *= self.voxel_mm

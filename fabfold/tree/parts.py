@@ -58,8 +58,8 @@ def parted(problem: TreeProblem, seed: int, depth: NDArray[np.float64]) -> TreeP
     Returns
     -------
     TreeProblem
-        Its trees fold into the template as it lies flat; :func:`fabfold.fold.closing.closed` adds
-        the folds along the creases.
+        Its trees fold into the template as it lies flat;
+        :func:`fabfold.fold.crease_hinges.add_crease_hinges` adds the folds along the creases.
 
     Raises
     ------
