@@ -85,7 +85,7 @@ class Unjudged(Unplanned, Unclosed):
 
 def changed(variant: str, job: Any, voxels: Any) -> Any:
     """The job of a seed as a variant has it."""
-    from fabfold.fold.cores import CORE
+    from fabfold.fold.core_sweep import CORE_HALF_SIDE
     from fabfold.fold.lattice_foldability import LatticeFoldability, octants_of
 
     effort, judge = job.effort, job.foldability
@@ -108,7 +108,7 @@ def changed(variant: str, job: Any, voxels: Any) -> Any:
     elif variant == "octants":
         judge = LatticeFoldability(octants=octants_of(voxels.subvoxels))
     elif variant == "carving":
-        judge = LatticeFoldability(carve=CORE, material=voxels.subvoxels)
+        judge = LatticeFoldability(carve=CORE_HALF_SIDE, material=voxels.subvoxels)
     return replace(job, effort=effort, foldability=judge)
 
 

@@ -31,9 +31,6 @@ class Recorder:
     seen: int = 0
     missed: list[Any] = field(default_factory=list)
 
-    def stuck(self, system: Any) -> Any:
-        return self.judge.stuck(system)
-
     def stuck_hinges(self, system: Any) -> Any:
         return self.judge.stuck_hinges(system)
 
@@ -44,9 +41,6 @@ class Recorder:
             if self.seen % 20 == 1 and len(self.missed) < self.wanted:
                 self.missed.append(system)
         return found
-
-    def unresolved(self, system: Any, expansions: int) -> float:
-        return float(self.judge.unresolved(system, expansions))
 
     def path(self, system: Any, guide: Any = None) -> Any:
         return self.judge.path(system, guide)
@@ -81,7 +75,7 @@ def near_misses(voxels: Any, template: str, count: int) -> list[Any]:
 
 def tree_of(system: Any) -> Any:
     """Fold tree of a hinge system of single hinges."""
-    from fabfold.fold.reference import poses
+    from fabfold.fold.system_kinematics import poses_at
     from fabfold.lattice.template import Template
     from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
 
@@ -124,7 +118,7 @@ def tree_of(system: Any) -> Any:
             Hinge(f"hinge-{h:02d}", parent, h + 1, (x, y, z), tuple(axis.tolist()), angle)
         )
         edges.append(Edge(i, j, "S", (h,)))
-    pose = poses(system, np.asarray(system.turns, dtype=float))[owner]
+    pose = poses_at(system, np.asarray(system.turns, dtype=float))[owner]
     target = np.rint(np.einsum("nij,nj->ni", pose[:, :3, :3], cells) + pose[:, :3, 3]).astype(int)
     shift = -target.min(axis=0)
     return FoldTree(
@@ -178,9 +172,9 @@ def prove(voxels: Any, system: Any, path: Any) -> str:
 def main() -> None:
     """Command line."""
     from fabfold.fold.carving_plan import carved_path
-    from fabfold.fold.cores import CORE
+    from fabfold.fold.core_sweep import CORE_HALF_SIDE
     from fabfold.fold.lattice_foldability import LatticeFoldability
-    from fabfold.fold.lattice_paths import find_path
+    from fabfold.fold.lattice_planner import find_path
     from fabfold.voxels.voxel_files import load_voxels
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
@@ -197,7 +191,7 @@ def main() -> None:
         if LatticeFoldability().path(system) is not None:
             print(f"{number}: folds with whole cells after a longer look")
             continue
-        planned += find_path(system, carve=CORE).path is not None
+        planned += find_path(system, carve=CORE_HALF_SIDE).path is not None
         best = carved_path(system, voxels.subvoxels)
         if best is None:
             print(f"{number}: no path of cores that spares the hinges")
@@ -205,7 +199,7 @@ def main() -> None:
         carved += 1
         path, carving = best
         words = (
-            f"{number}: {len(carving.meetings)} meetings, {np.count_nonzero(carving.lost)} cells, "
+            f"{number}: {len(carving.clashes)} clashes, {np.count_nonzero(carving.lost)} cells, "
             f"{carving.lost.sum():.2f} cells of volume, {time.process_time() - start:.1f} s"
         )
         if proven < given.prove:

@@ -92,25 +92,25 @@ def strip_system() -> Any:
 
 
 def do_closure(_seed: int) -> str:
-    from fabfold.fold.lattice_paths import stuck_hinges
+    from fabfold.fold.lattice_planner import stuck_hinges
 
     return digest(stuck_hinges(strip_system()))
 
 
 def do_plan(_seed: int) -> str:
-    from fabfold.fold.lattice_paths import find_path
+    from fabfold.fold.lattice_planner import find_path
 
     found = find_path(strip_system(), 300, 60)
     path = np.zeros(0) if found.path is None else found.path
-    return digest(found.levels, found.expansions, path, found.apart)
+    return digest(found.remaining, found.expansions, path, found.apart)
 
 
 def do_certify(_seed: int) -> str:
     """The swept proof of a barrel in its sleeve."""
     import manifold3d
 
-    from fabfold.proof.bvh import empty_boxes, refit
-    from fabfold.proof.gap import least_gap
+    from fabfold.proof.bvh import new_box_trees, refit
+    from fabfold.proof.gap import prove_gap
 
     cylinder = manifold3d.Manifold.cylinder
     sleeve = cylinder(6.0, 5.0, 5.0, 24, True) - cylinder(9.0, 2.8, 2.8, 24, True)
@@ -118,10 +118,10 @@ def do_certify(_seed: int) -> str:
     for solid in (cylinder(8.0, 2.5, 2.5, 24, True), sleeve):
         mesh = solid.to_mesh64()
         parts.append(np.array(mesh.vert_properties[:, :3])[np.array(mesh.tri_verts)])
-    boxes, _ = empty_boxes(parts)
+    boxes, _ = new_box_trees(parts)
     refit(boxes, boxes.triangle.copy(), 0, int(boxes.root[-1]))
     result = np.array([1.0, np.inf, 0.0])
-    verdict = least_gap(boxes, 0, 1, 0.0, np.pi / 2, 0.2, 0.01, result)
+    verdict = prove_gap(boxes, 0, 1, 0.0, np.pi / 2, 0.2, 0.01, result)
     return digest(int(verdict), result)
 
 
@@ -130,7 +130,7 @@ TASKS: dict[str, tuple[Callable[[int], str], str]] = {
     "search": (do_solve, "`solve`, the car, one start with the least effort"),
     "closure": (do_closure, "`stuck_hinges`, a strip with 7 hinges, both ends"),
     "planner": (do_plan, "`find_path`, a strip with 7 hinges"),
-    "proof": (do_certify, "`least_gap`, a barrel in its sleeve through 90°"),
+    "proof": (do_certify, "`prove_gap`, a barrel in its sleeve through 90°"),
 }
 
 

@@ -74,7 +74,7 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
 
 def measure(systems: list[Any]) -> list[dict[str, Any]]:
     """Found paths and CPU milliseconds of each variant, the same systems in the same order."""
-    from fabfold.fold.lattice_paths import find_path
+    from fabfold.fold.lattice_planner import find_path
 
     rows = []
     for name, looks in VARIANTS:
@@ -87,7 +87,7 @@ def measure(systems: list[Any]) -> list[dict[str, Any]]:
                     system, 2500, patience, short=False, guide=guide if guided else None
                 )
                 expansions += plan.expansions
-                if plan.levels == 0:
+                if plan.remaining == 0:
                     found += 1
                     break
         took = time.process_time() - begin

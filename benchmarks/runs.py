@@ -187,19 +187,11 @@ class Judge:
     def __init__(self, judge: Any) -> None:
         self.judge = judge
 
-    def stuck(self, system: Any) -> tuple[int, int]:
-        one, two = self.stuck_hinges(system).sum(axis=1)
-        return int(one), int(two)
-
     def stuck_hinges(self, system: Any) -> Any:
         return self.judge.stuck_hinges(system)
 
     def estimate(self, system: Any, expansions: int, guide: Any = None) -> Any:
         return self.judge.estimate(system, expansions, guide)
-
-    def unresolved(self, system: Any, expansions: int) -> float:
-        left = self.estimate(system, expansions).unresolved
-        return float(left.sum()) / max(1, 2 * len(left))
 
     def path(self, system: Any, guide: Any = None) -> Any:
         return self.judge.path(system, guide)

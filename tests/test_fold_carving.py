@@ -1,4 +1,4 @@
-"""Which cells give way to each other: cores, meetings, volumes, hinges and skin spared."""
+"""Which cells give way to each other: cores, clashes, volumes, hinges and skin spared."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from carving_models import (
     full_material,
     tree_of,
 )
+from fold_oracle import TOUCH, turn_overlap
 from test_fold_lattice import random_system
 
-from fabfold.fold.carving_plan import Carving, carved_path, plan_carving
-from fabfold.fold.clashes import meetings_on
-from fabfold.fold.cores import CORE, core_table
+from fabfold.fold.carving_plan import CarvingPlan, carved_path, plan_carving
+from fabfold.fold.clashes import clashes_on
+from fabfold.fold.core_sweep import CORE_HALF_SIDE, core_sweep_table
 from fabfold.fold.lattice_foldability import LatticeFoldability
-from fabfold.fold.lattice_paths import closure, find_path, free_moves
-from fabfold.fold.reference import TOUCH, turn_overlap
+from fabfold.fold.lattice_planner import count_free_moves, find_path, stuck_hinges
 from fabfold.lattice.sweep import sweep_table
 from fabfold.tree.system import hinge_system
 
@@ -55,9 +55,9 @@ def squares_meet(one, other):
     return True
 
 
-@pytest.mark.parametrize("half_side", [0.25, CORE, 0.4])
+@pytest.mark.parametrize("half_side", [0.25, CORE_HALF_SIDE, 0.4])
 def test_cores_sweep_what_turning_squares_show(half_side):
-    table = core_table(8, half_side)
+    table = core_sweep_table(8, half_side)
     whole = sweep_table(8)
     turns = [
         np.array([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]])
@@ -76,22 +76,22 @@ def test_cores_sweep_what_turning_squares_show(half_side):
 
 
 def test_cores_of_whole_cells_are_whole_cells():
-    assert (core_table(8, 0.5).cells == sweep_table(8).cells).all()
+    assert (core_sweep_table(8, 0.5).cells == sweep_table(8).cells).all()
     with pytest.raises(ValueError, match="half_side"):
-        core_table(8, 0.6)
+        core_sweep_table(8, 0.6)
 
 
 def test_whole_cubes_block_and_cores_pass(slot):
     _, system, path = slot
-    assert closure(system) != (0, 0)
+    assert stuck_hinges(system).any()
     assert find_path(system).path is None
-    assert closure(system, carve=CORE) == (0, 0)
-    assert find_path(system, carve=CORE).path.tolist() == path.tolist()
-    assert free_moves(system, path) == 0
-    assert free_moves(system, path, carve=CORE) == 1
+    assert not stuck_hinges(system, carve=CORE_HALF_SIDE).any()
+    assert find_path(system, carve=CORE_HALF_SIDE).path.tolist() == path.tolist()
+    assert count_free_moves(system, path) == 0
+    assert count_free_moves(system, path, carve=CORE_HALF_SIDE) == 1
 
 
-def test_meetings_are_the_overlaps_of_cubes():
+def test_clashes_are_the_overlaps_of_cubes():
     found = 0
     for seed in range(12):
         system = random_system((3, 3, 2), 5, seed, 0)
@@ -100,16 +100,16 @@ def test_meetings_are_the_overlaps_of_cubes():
             for way in (1, -1):
                 deep = turn_overlap(system, start, hinge, way)
                 wanted = {tuple(sorted(pair)) for pair in np.argwhere(deep > TOUCH).tolist()}
-                met = meetings_on(system, np.array([[hinge, way]]))
+                met = clashes_on(system, np.array([[hinge, way]]))
                 assert {tuple(sorted((m.first, m.second))) for m in met} == wanted
                 found += len(wanted)
     assert found > 100
 
 
-def test_turns_forth_and_back_are_one_meeting(slot):
+def test_turns_forth_and_back_are_one_clash(slot):
     _, system, path = slot
-    once = meetings_on(system, path)
-    again = meetings_on(system, np.array([[0, 2], [0, -2], [0, 1], [0, -1], [0, 2]]))
+    once = clashes_on(system, path)
+    again = clashes_on(system, np.array([[0, 2], [0, -2], [0, 1], [0, -1], [0, 2]]))
     assert len(once) == len(again) == 1
 
 
@@ -159,7 +159,7 @@ def test_empty_material_need_not_give_way(slot):
     wall = voxel(tree, (2, 0, 0))
     material[wall, :9] = False  # 0.45 of the wall's cell, beyond the reach of 0.415
     carving = plan_carving(system, path, material)
-    assert len(carving.meetings) == 1
+    assert len(carving.clashes) == 1
     assert carving.lost.sum() == 0.0
     assert carving.cost == 0.0
 
@@ -172,7 +172,7 @@ def test_hinges_are_never_carved(lid):
     # The bracket on the wall's edge reaches radius 1.2: on all rings inside the cell gives way.
     rings = {
         (m.first, m.second): ring
-        for m, ring in zip(carving.meetings, carving.rings.tolist(), strict=True)
+        for m, ring in zip(carving.clashes, carving.rings.tolist(), strict=True)
     }
     low, high = rings[turning, wall]
     assert low <= 1.0
@@ -199,15 +199,14 @@ def test_skin_is_spared():
 
 def test_judge_looks_at_cores_only_when_asked(slot):
     tree, system, path = slot
-    judge = LatticeFoldability(carve=CORE, material=full_material(tree))
+    assert LatticeFoldability().estimate(system, 100).unresolved.any()
+    judge = LatticeFoldability(carve=CORE_HALF_SIDE, material=full_material(tree))
     judge = pickle.loads(pickle.dumps(judge))
     assert LatticeFoldability().path(system) is None
     assert judge.path(system).tolist() == path.tolist()
-    assert judge.stuck(system) == (0, 0)
     assert not judge.stuck_hinges(system).any()
-    assert judge.unresolved(system, 100) == 0.0
     assert not judge.estimate(system, 100).unresolved.any()
-    assert LatticeFoldability(carve=CORE).path(system).tolist() == path.tolist()
+    assert LatticeFoldability(carve=CORE_HALF_SIDE).path(system).tolist() == path.tolist()
 
 
 def test_path_that_needs_no_carving_is_preferred():
@@ -218,8 +217,8 @@ def test_path_that_needs_no_carving_is_preferred():
     )
     system = hinge_system(tree)
     path, carving = carved_path(system, full_material(tree))
-    assert free_moves(system, path) == len(path)
-    assert carving.meetings == ()
+    assert count_free_moves(system, path) == len(path)
+    assert carving.clashes == ()
     assert path[0, 0] == 1
 
 
@@ -227,7 +226,7 @@ def test_the_same_again(lid):
     tree, system, _ = lid
     first, second = (carved_path(system, full_material(tree)) for _ in range(2))
     assert (first[0] == second[0]).all()
-    assert isinstance(first[1], Carving)
+    assert isinstance(first[1], CarvingPlan)
     assert (first[1].rings == second[1].rings).all()
     assert (first[1].lost == second[1].lost).all()
 

@@ -11,9 +11,9 @@ import pytest
 
 from fabfold.errors import CheckError
 from fabfold.fold.motion import Motion
-from fabfold.proof.bvh import empty_boxes, refit
+from fabfold.proof.bvh import new_box_trees, refit
 from fabfold.proof.certify import certify
-from fabfold.proof.gap import DONE, FAILED, least_gap, triangle_distance
+from fabfold.proof.gap import DONE, FAILED, prove_gap, triangle_distance
 
 VOXEL = 10.0
 ORIGIN = (3.0, -2.0, 7.0)
@@ -137,7 +137,7 @@ def test_order_of_triangles_does_not_matter_and_runs_repeat():
 
 
 def fitted(meshes):
-    boxes, _ = empty_boxes([np.asarray(v, float)[f] for v, f in meshes])
+    boxes, _ = new_box_trees([np.asarray(v, float)[f] for v, f in meshes])
     refit(boxes, boxes.triangle.copy(), 0, int(boxes.root[-1]))
     return boxes
 
@@ -153,9 +153,9 @@ def test_a_barrel_in_its_sleeve_keeps_the_radial_gap():
     # Facets of the bore come nearer to the axis than its corners, and corners of the pin pass.
     true = 2.8 * np.cos(np.pi / 48) - 2.5
     result = np.array([1.0, np.inf, 0.0])
-    assert least_gap(fitted([pin, sleeve]), 0, 1, 0.0, np.pi, 0.25, 0.005, result) == DONE
+    assert prove_gap(fitted([pin, sleeve]), 0, 1, 0.0, np.pi, 0.25, 0.005, result) == DONE
     assert true - 0.006 <= result[1] <= true + 1e-9
-    assert least_gap(fitted([pin, sleeve]), 0, 1, 0.0, np.pi, true + 0.01, 0.005, result) == FAILED
+    assert prove_gap(fitted([pin, sleeve]), 0, 1, 0.0, np.pi, true + 0.01, 0.005, result) == FAILED
 
 
 def test_bounds_hold_the_distances_of_an_independent_sampling():
@@ -174,7 +174,7 @@ def test_bounds_hold_the_distances_of_an_independent_sampling():
     for trial in range(12):
         one = rng.normal(size=(12, 1, 3)) * 3 + rng.normal(size=(12, 3, 3)) * (0.3 + trial % 3)
         two = rng.normal(size=(9, 1, 3)) * 3 + rng.normal(size=(9, 3, 3)) + [0, 0, 4 + trial]
-        boxes, _ = empty_boxes([one, two])
+        boxes, _ = new_box_trees([one, two])
         refit(boxes, boxes.triangle.copy(), 0, int(boxes.root[-1]))
         low, high = sorted(rng.uniform(-3, 3, 2))
         high = min(high, low + np.pi)
@@ -187,7 +187,7 @@ def test_bounds_hold_the_distances_of_an_independent_sampling():
             moving.setTransform(fcl.Transform(spin, np.zeros(3)))
             sampled = min(sampled, fcl.distance(moving, still))
         result = np.array([100.0, np.inf, 0.0])
-        verdict = least_gap(boxes, 0, 1, low, high, 1e-3, 1e-3, result)
+        verdict = prove_gap(boxes, 0, 1, low, high, 1e-3, 1e-3, result)
         if sampled <= 1e-3:
             assert verdict == FAILED
         elif verdict == DONE:

@@ -1,4 +1,4 @@
-"""Folding on the lattice: sweeps, closure, planner, shortcut, against the plain meaning."""
+"""Folding on the lattice: sweeps, planner, shortcut, against the plain meaning."""
 
 from __future__ import annotations
 
@@ -7,11 +7,7 @@ from collections import deque
 
 import numpy as np
 import pytest
-
-from fabfold.fold.lattice_foldability import LatticeFoldability, octants_of
-from fabfold.fold.lattice_paths import _ready, closure, find_path, free_moves, refined
-from fabfold.fold.mechanism import pose_scene
-from fabfold.fold.reference import (
+from fold_oracle import (
     TOUCH,
     barrel_meetings,
     path_overlap,
@@ -22,12 +18,27 @@ from fabfold.fold.reference import (
     stuck,
     turn_overlap,
 )
-from fabfold.fold.turns import obstacles, workspace
+
+from fabfold.fold.lattice_foldability import LatticeFoldability, octants_of
+from fabfold.fold.lattice_planner import (
+    count_free_moves,
+    find_path,
+    kernel_inputs,
+    refined,
+    stuck_hinges,
+)
+from fabfold.fold.scene import pose_scene
+from fabfold.fold.turn_obstacles import obstacles, turn_buffers
 from fabfold.lattice.rotations import FACES
 from fabfold.lattice.sweep import sweep_table
 from fabfold.tree.system import HingeSystem
 
 JUDGE = LatticeFoldability()
+
+
+def stuck_counts(system):
+    """How many hinges the closure test finds stuck, from A and from B."""
+    return tuple(stuck_hinges(system).sum(axis=1).tolist())
 
 
 def system_of(cells, groups, hinges):
@@ -181,8 +192,8 @@ def test_sweep_table_is_what_a_turning_square_passes_over():
 
 def test_strip_of_four_folds_by_one_half_turn():
     system = strip(4, [(1, (0, 1, 0))])
-    assert closure(system) == (0, 0)
-    assert JUDGE.unresolved(system, 40) == 0.0
+    assert stuck_counts(system) == (0, 0)
+    assert JUDGE.estimate(system, 40).unresolved.tolist() == [0]
     path = JUDGE.path(system)
     assert path.tolist() == [[0, 2]]
     end = poses(system, np.array([2.0]))[1]
@@ -203,13 +214,13 @@ def test_strip_of_eight_folds_into_a_cube():
 def test_zigzag_strip_that_closes_on_itself_is_stuck():
     system = strip(8, [(1, (0, 1, 0)), (3, (0, 1, 0)), (5, (0, 1, 0))])
     assert JUDGE.path(system) is None
-    assert JUDGE.unresolved(system, 40) > 0.0
+    assert JUDGE.estimate(system, 40).unresolved.sum() > 0
 
 
 def test_a_block_inside_a_ring_cannot_leave():
     ring = [(x, y, 0) for x in range(3) for y in range(3) if (x, y) != (1, 1)]
     system = system_of([*ring, (1, 1, 0)], [0] * 8 + [1], [((0, 1, 0), (1, 1, 0), (0, 1, 0), 1)])
-    assert closure(system)[0] == 1
+    assert stuck_counts(system)[0] == 1
     assert JUDGE.path(system) is None
 
 
@@ -223,11 +234,11 @@ def test_planner_and_closure_agree_with_brute_force(shape, quarter):
         found = find_path(system)
         assert (found.path is not None) == want, seed
         expected = (stuck(system, 0 * goal, 1), stuck(system, goal, -1))
-        assert closure(system) == expected, seed
+        assert stuck_counts(system) == expected, seed
         if want:
             folding += 1
-            assert closure(system) == (0, 0)
-            assert free_moves(system, found.path) == len(found.path)
+            assert stuck_counts(system) == (0, 0)
+            assert count_free_moves(system, found.path) == len(found.path)
             assert max(path_overlap(system, found.path)) <= TOUCH
             turned = np.zeros(len(goal), dtype=int)
             np.add.at(turned, found.path[:, 0], found.path[:, 1])
@@ -243,7 +254,7 @@ def test_links_without_cells_fold_as_brute_force_says():
         path = JUDGE.path(system)
         assert (path is not None) == want, seed
         goal = system.turns.astype(int)
-        assert closure(system) == (stuck(system, 0 * goal, 1), stuck(system, goal, -1)), seed
+        assert stuck_counts(system) == (stuck(system, 0 * goal, 1), stuck(system, goal, -1)), seed
         folding += want
     assert folding >= 5
 
@@ -252,7 +263,7 @@ def test_larger_random_systems_have_the_closure_of_the_reference():
     for seed in range(12):
         system = random_system((3, 3, 3), 9, seed, 0)
         zero = np.zeros(8, dtype=int)
-        assert closure(system)[0] == stuck(system, zero, 1), seed
+        assert stuck_counts(system)[0] == stuck(system, zero, 1), seed
 
 
 def test_barrels_may_not_share_a_lattice_edge():
@@ -260,8 +271,8 @@ def test_barrels_may_not_share_a_lattice_edge():
     system = strip(4, [(0, (0, 1, 0)), (1, (0, 1, 0)), (2, (0, 1, 0))])
     assert not state_is_valid(system, np.array([0, 2, 0]))
     assert turn_overlap(system, np.zeros(3, dtype=int), 1, 2).max() <= TOUCH
-    assert free_moves(system, np.array([[1, 1]])) == 1
-    assert free_moves(system, np.array([[1, 2]])) == 0
+    assert count_free_moves(system, np.array([[1, 1]])) == 1
+    assert count_free_moves(system, np.array([[1, 2]])) == 0
     assert JUDGE.path(system) is None
 
 
@@ -270,7 +281,7 @@ def test_whole_cells_cut_into_eighths_fold_as_before():
         system = random_system((2, 2, 2), 4, seed)
         fine = refined(system, np.ones((len(system.cells), 2, 2, 2), dtype=bool))
         # Barrels may come a little nearer to each other there, so a few more systems fold.
-        assert np.all(np.subtract(closure(system), closure(fine)) >= 0)
+        assert np.all(np.subtract(stuck_counts(system), stuck_counts(fine)) >= 0)
         if JUDGE.path(system) is not None:
             assert JUDGE.path(fine) is not None
 
@@ -279,17 +290,17 @@ def test_missing_eighths_set_a_hinge_free():
     # The third cell stands in the corner that the second one sweeps.
     cells = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
     system = system_of(cells, [0, 1, 0], [((0, 0, 0), (1, 0, 0), (0, 1, 0), 1)])
-    assert closure(system)[0] == 1
+    assert stuck_counts(system)[0] == 1
     octants = np.zeros((3, 2, 2, 2), dtype=bool)
     octants[0] = True
     octants[1, 0, 1] = True  # of the flap, what is near the axis
     octants[2, 1, 1] = True  # of the obstacle, what is far from it
-    assert closure(refined(system, octants)) == (0, 0)
+    assert stuck_counts(refined(system, octants)) == (0, 0)
     finer = LatticeFoldability(octants=octants)
-    assert finer.stuck(system) == (0, 0)
+    assert not finer.stuck_hinges(system).any()
     assert finer.path(system).tolist() == [[0, int(system.turns[0])]]
     octants[2, 1, 0] = True
-    assert closure(refined(system, octants))[0] == 1
+    assert stuck_counts(refined(system, octants))[0] == 1
 
 
 def test_octants_hold_any_material():
@@ -298,7 +309,7 @@ def test_octants_hold_any_material():
     octants = octants_of(subvoxels)
     assert np.argwhere(octants).tolist() == [[1, 1, 0, 0]]
     with pytest.raises(ValueError, match="octants"):
-        LatticeFoldability(octants=octants).stuck(strip(4, [(1, (0, 1, 0))]))
+        LatticeFoldability(octants=octants).stuck_hinges(strip(4, [(1, (0, 1, 0))]))
 
 
 def test_answers_do_not_depend_on_the_order_of_voxels_and_survive_pickling():
@@ -308,21 +319,24 @@ def test_answers_do_not_depend_on_the_order_of_voxels_and_survive_pickling():
     judge = pickle.loads(pickle.dumps(JUDGE))
     assert judge == JUDGE
     assert np.array_equal(judge.path(system), JUDGE.path(other))
-    assert judge.unresolved(system, 40) == JUDGE.unresolved(other, 40)
+    assert (
+        judge.estimate(system, 40).unresolved.tolist()
+        == JUDGE.estimate(other, 40).unresolved.tolist()
+    )
 
 
 def test_systems_that_are_not_on_the_lattice_are_refused():
     system = strip(4, [(1, (0, 1, 0))])
     with pytest.raises(ValueError, match="lattice edge"):
-        closure(system._replace(point2=system.point2 + np.array([[0, 1, 0]], dtype=np.int32)))
+        stuck_counts(system._replace(point2=system.point2 + np.array([[0, 1, 0]], dtype=np.int32)))
     with pytest.raises(ValueError, match="270"):
-        closure(system._replace(turns=np.array([4], dtype=np.int8)))
+        stuck_counts(system._replace(turns=np.array([4], dtype=np.int8)))
 
 
 def test_no_hinges_means_nothing_to_fold():
     system = system_of([(0, 0, 0)], [0], [])
-    assert closure(system) == (0, 0)
-    assert JUDGE.unresolved(system, 40) == 0.0
+    assert stuck_counts(system) == (0, 0)
+    assert JUDGE.estimate(system, 40).unresolved.shape == (0,)
     assert JUDGE.path(system).shape == (0, 2)
 
 
@@ -384,9 +398,9 @@ def test_plates_meet_what_the_reference_says():
 
 def turn_free(system, quarters, hinge, way):
     """Whether the kernels let a hinge make a step from a state."""
-    mech, at, table = _ready(system)
+    mech, scene, table = kernel_inputs(system)
     place = int(np.flatnonzero(mech.origin == hinge)[0])
     steps = np.abs(quarters)[mech.origin].astype(np.int8)
-    assert pose_scene(mech, at, steps)
+    assert pose_scene(mech, scene, steps)
     step = 1 if way * int(system.turns[hinge]) > 0 else -1
-    return obstacles(mech, at, table, place, step, workspace(0)) == 0
+    return obstacles(mech, scene, table, place, step, turn_buffers(0)) == 0

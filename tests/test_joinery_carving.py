@@ -112,7 +112,7 @@ def test_a_cut_through_a_hinge_is_refused(slot, monkeypatch):
 
     def blocked(*args, **kwargs):
         carving = real(*args, **kwargs)
-        return replace(carving, blocked=((carving.meetings[0].first, carving.meetings[0].second),))
+        return replace(carving, blocked=((carving.clashes[0].first, carving.clashes[0].second),))
 
     monkeypatch.setattr("fabfold.joinery.carving.plan_carving", blocked)
     with pytest.raises(GeometryError, match=r"body-01 and body-00.*hinge"):

@@ -1,4 +1,4 @@
-"""The steps of joinery one by one: cells, grooves, sound meshes, barrels that meet."""
+"""The steps of joinery one by one: cells, grooves, sound meshes."""
 
 from __future__ import annotations
 
@@ -10,15 +10,12 @@ import pytest
 from joinery_models import corner_tree, motion_of_order, strip_tree
 
 from fabfold.errors import GeometryError
-from fabfold.fold.barrels import encounter_on_lattice, first_encounter, segment_distance
-from fabfold.fold.motion import Motion
 from fabfold.joinery.barrel_sweeps import Sweep, barrel_sweeps, descendants
 from fabfold.joinery.cells import as_manifold, eroded_cells, occupancy
 from fabfold.joinery.grooves import groove_tools
 from fabfold.joinery.hinge_placement import hinge_frames
 from fabfold.joinery.soundness import mesh_faults, piece_count, printable_body, stl_mesh
 from fabfold.lattice.rotations import rotation_about
-from fabfold.tree.system import hinge_system
 
 CELLS = {
     "one": [[0, 0, 0]],
@@ -217,56 +214,3 @@ def test_body_that_touches_itself_is_nicked_apart():
     assert solid.volume() == pytest.approx(body.volume(), rel=1e-3)
     with pytest.raises(GeometryError, match="nothing is left"):
         printable_body(manifold3d.Manifold(), "body-00", np.zeros(3))
-
-
-def test_segment_distance():
-    first = np.array([[[0.0, 0, 0], [1, 0, 0]], [[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [1, 0, 0]]])
-    second = np.array([[[0.5, 1, -1], [0.5, 1, 1]], [[0, 2, 0], [1, 2, 0]], [[3, 0, 4], [3, 1, 4]]])
-    assert segment_distance(first, second) == pytest.approx([1.0, 2.0, np.sqrt(20.0)])
-
-
-def test_barrels_that_swing_into_each_other_are_seen_before_cutting():
-    zigzag = strip_tree(8, [1, -1, 1])
-    flat = np.array([[2, 2], [1, -2], [0, 2]])
-    assert encounter_on_lattice(hinge_system(zigzag), flat) is None
-    assert _nearest_by_brute_force(zigzag, flat) > 0.265
-    motion = motion_of_order(zigzag, [2, 1, 0])
-    assert first_encounter(zigzag, motion, inset=0.265, least=0.265) is None
-    # All hinges on one side: rolled up, the third barrel comes to lie on the first.
-    roll = strip_tree(8, [1, 1, 1])
-    rolled = np.array([[0, 1], [1, 1], [2, 1], [0, 1], [1, 1]])
-    found = encounter_on_lattice(hinge_system(roll), rolled)
-    assert (found.move, found.turning, found.moving, found.resting) == (5, 1, 2, 0)
-    assert found.distance == pytest.approx(_nearest_by_brute_force(roll, rolled), abs=1e-3)
-
-
-def _nearest_by_brute_force(tree, path) -> float:
-    half = 0.5 - 0.265
-    ends = np.array(
-        [
-            [np.array(h.point) + s * half * np.array(h.direction) for s in (-1, 1)]
-            for h in tree.hinges
-        ]
-    )
-    angles, nearest = np.zeros(len(tree.hinges)), np.inf
-    for hinge, quarters in path.tolist():
-        for share in np.linspace(0.0, 1.0, 91):
-            now = angles.copy()
-            now[hinge] += 90.0 * quarters * share
-            poses = tree.body_poses(now)
-            placed = np.array(
-                [
-                    e @ poses[h.parent][:3, :3].T + poses[h.parent][:3, 3]
-                    for e, h in zip(ends, tree.hinges, strict=True)
-                ]
-            )
-            for i, j in itertools.combinations(range(len(ends)), 2):
-                nearest = min(nearest, float(segment_distance(placed[i], placed[j])))
-        angles[hinge] += 90.0 * quarters
-    return nearest
-
-
-def test_still_motion_has_no_encounter():
-    tree = strip_tree(4, [1])
-    still = Motion(("hinge-00",), np.zeros((1, 1)), ((),))
-    assert first_encounter(tree, still, inset=0.265, least=0.265) is None

@@ -9,9 +9,9 @@ from tree_cases import solid_problem, strip
 
 from fabfold.errors import ModelError, NoTreeError, RecipeError, TemplateError
 from fabfold.export.flat import flat_poses
-from fabfold.fold.closing import closed
+from fabfold.fold.crease_hinges import add_crease_hinges
 from fabfold.fold.lattice_foldability import LatticeFoldability
-from fabfold.fold.lattice_paths import free_moves
+from fabfold.fold.lattice_planner import count_free_moves
 from fabfold.fold.motion import end_pose_error, motion_of
 from fabfold.joinery.bodies import Joinery
 from fabfold.lattice.creases import folded_template, parts_of
@@ -161,7 +161,7 @@ def test_shipped_folding_templates_fold_into_a_box_without_collision(name):
     )
     order = sorted(range(len(turns)), key=lambda h: parts.crease[h + 1])
     path = np.array([(h, turns[h]) for h in order])
-    assert free_moves(system, path) == len(path)
+    assert count_free_moves(system, path) == len(path)
 
 
 def test_a_model_folds_into_the_flat_template_and_then_shut(tmp_path):
@@ -171,7 +171,8 @@ def test_a_model_folds_into_the_flat_template_and_then_shut(tmp_path):
     found = []
     for seed in range(6):
         found += solve(ready, seed, LatticeFoldability(), Effort(polish_best=20))
-        shut = [c for c in (closed(candidate, template) for candidate in found) if c is not None]
+        folded = [add_crease_hinges(candidate, template) for candidate in found]
+        shut = [c for c in folded if c is not None]
         if shut:
             break
     tree = shut[0].tree
@@ -179,7 +180,7 @@ def test_a_model_folds_into_the_flat_template_and_then_shut(tmp_path):
     assert tree.template.name == "box-4x2x2"
     motion = motion_of(tree, shut[0].path)
     assert end_pose_error(tree, motion.angles_deg[-1]) < 1e-9
-    assert free_moves(hinge_system(tree), shut[0].path) == len(shut[0].path)
+    assert count_free_moves(hinge_system(tree), shut[0].path) == len(shut[0].path)
     # The crease's hinge rests until all the others are done; then the whole lies flat.
     crease, quarters = shut[0].path[-1].tolist()
     assert abs(quarters) == 2

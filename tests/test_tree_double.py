@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fold_oracle import TOUCH, path_overlap
 from tree_cases import face_pairs, strip
 
 from fabfold.errors import NoTreeError
 from fabfold.fold.lattice_foldability import LatticeFoldability
-from fabfold.fold.lattice_paths import find_path, free_moves
-from fabfold.fold.reference import TOUCH, path_overlap
+from fabfold.fold.lattice_planner import count_free_moves, find_path
 from fabfold.lattice.rotations import FACES, ROTATIONS, parity
 from fabfold.lattice.shipped import load_template
 from fabfold.recipe.recipe_wishes import default_weights
@@ -167,7 +167,7 @@ def test_the_filter_agrees_with_the_planner_on_two_cubes():
                 assert blocked == (path is None), (first, q1, second, q2)
                 if path is not None:
                     passed += 1
-                    assert free_moves(system, path) == len(path)
+                    assert count_free_moves(system, path) == len(path)
                     assert max(path_overlap(system, path)) <= TOUCH
     assert passed
 

@@ -14,7 +14,7 @@ from tree_cases import face_pairs, solid_problem, strip
 
 from fabfold.errors import NoTreeError
 from fabfold.fold.lattice_foldability import LatticeFoldability
-from fabfold.fold.lattice_paths import free_moves
+from fabfold.fold.lattice_planner import count_free_moves
 from fabfold.fold.motion import motion_of
 from fabfold.joinery.build import build_bodies
 from fabfold.joinery.cells import eroded_cells
@@ -309,8 +309,8 @@ def test_thin_ends_share_a_cell(folded):
 def test_path_is_free_for_eighths_and_not_for_cells(folded):
     tree, path = folded[2].tree, folded[2].path
     system = hinge_system(tree)
-    assert free_moves(system, path) == len(path)
-    assert free_moves(system._replace(octants=None), path) < len(path)
+    assert count_free_moves(system, path) == len(path)
+    assert count_free_moves(system._replace(octants=None), path) < len(path)
     judge = LatticeFoldability()
     assert not judge.stuck_hinges(system).any()
     assert not judge.estimate(system, 400).unresolved.any()

@@ -8,7 +8,7 @@ from tree_cases import animal, solid_problem, strip
 
 from fabfold.errors import NoFoldError, NoTreeError
 from fabfold.fold.lattice_foldability import LatticeFoldability
-from fabfold.fold.lattice_paths import free_moves
+from fabfold.fold.lattice_planner import count_free_moves
 from fabfold.tree.effort import Effort
 from fabfold.tree.initial_poses import grow
 from fabfold.tree.kinematics_check import check_tree
@@ -122,7 +122,7 @@ def test_an_animal_folds(dog_trees):
         turned = np.zeros(len(system.turns), dtype=int)
         np.add.at(turned, candidate.path[:, 0], candidate.path[:, 1])
         assert (turned == system.turns).all()
-        assert free_moves(system, candidate.path) == len(candidate.path)
+        assert count_free_moves(system, candidate.path) == len(candidate.path)
 
 
 def test_candidates_differ(dog_trees):

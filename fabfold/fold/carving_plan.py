@@ -1,19 +1,19 @@
-"""Which cells must lose material so that a path of cores is free, and which side gives way.
+"""Plan the carving: which cells lose material so that a path of cores is free, and where.
 
-A path planned with the cores of cells (:mod:`fabfold.fold.cores`) drives some whole cells into each
-other (:mod:`fabfold.fold.clashes`): on some rings about the axis, a point of the second cell lies
-at no smaller an angle than a point of the first.
+A path planned with the cores of cells (:mod:`fabfold.fold.core_sweep`) drives some whole cells into
+each other (:mod:`fabfold.fold.clashes`): on some rings about the axis, a point of the second cell
+lies at no smaller an angle than a point of the first.
 
-So every ring of such a meeting is freed in one of two ways: the first loses all that lies behind
+So every ring of such a clash is freed in one of two ways: the first loses all that lies behind
 the farthest point of the second, or the second loses all that lies ahead of the nearest point of
 the first. A cell that turns beside its neighbour is rounded to radius 1 in this way, and loses
 1 - π/4 of its volume, 21 %. Only material counts: where a cell is empty, nothing must give way.
 
-The choice is a covering problem. Its cost is the volume that is lost, counted once however many
-meetings want it; what shows on the model's surface and the cells' cores cost more, and the brackets
-that carry hinges are not to be had. It is solved greedily, the costliest meeting first, and then
-improved meeting by meeting. The sides are chosen on the 20 x 20 x 20 subvoxels; what is cut in the
-end is worked out on the solids (:mod:`fabfold.joinery.carving`).
+The choice is a weighted set cover. Its cost is the volume that is lost, counted once however many
+clashes want it; what shows on the model's surface and the cells' cores cost more, and the brackets
+that carry hinges are not to be had. It is solved greedily, the costliest clash first, and then
+improved clash by clash (:mod:`fabfold.fold.carving_choice`). It is made on the 20 x 20 x 20
+subvoxels; what is cut in the end is worked out on the solids (:mod:`fabfold.joinery.carving`).
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.fold.clashes import Meeting, meetings_on
-from fabfold.fold.cores import CORE
-from fabfold.fold.sides import Views, choose
+from fabfold.fold.carving_choice import ClashArrays, choose_carving
+from fabfold.fold.clashes import Clash, clashes_on
+from fabfold.fold.core_sweep import CORE_HALF_SIDE
 from fabfold.tree.system import HingeSystem
 
-__all__ = ["BRACKET", "Carving", "carved_path", "plan_carving", "skin_of"]
+__all__ = ["BRACKET", "CarvingPlan", "carved_path", "plan_carving", "skin_of"]
 
 F64 = NDArray[np.float64]
 
@@ -39,34 +39,36 @@ BRACKET = (0.235, 0.12)
 SKIN_COST, CORE_COST, HINGE_COST = 3.0, 2.0, 1e6
 #: Subvoxels that count as surface, counted from the outside.
 _SKIN_DEPTH = 2
-#: Radii at which a meeting may change sides.
+#: Radii at which the voxel that gives way may change, in one clash.
 _SPLITS = 11
 #: Meetings that may be worked out anew to improve a first choice.
 _IMPROVEMENTS = 60_000
-#: Prices of carving with which the planner is asked, see :func:`fabfold.fold.planner.plan`.
+#: Prices of a clash, in steps, with which the planner is asked.
 _PRICES = (0.3, 1.0, 0.05)
 
 
 @dataclass(frozen=True)
-class Carving:
-    """What is to be carved, meeting by meeting in this order.
+class CarvingPlan:
+    """What is to be carved, clash by clash in this order.
 
     Attributes
     ----------
-    meetings : tuple of Meeting
+    clashes : tuple of m Clash
+        Pairs of voxels that run into each other.
     rings : (m, 2) float64 array
-        Between these two radii the first voxel of a meeting gives way, elsewhere the second.
+        Between these two radii, in lattice units, the first voxel of a clash gives way, elsewhere
+        the second.
     lost : (n,) float64 array
-        Share of a full cell that each voxel loses, estimated on subvoxels.
+        Share of a full cell that each voxel loses, 0 to 1, estimated on subvoxels.
     skin : (n,) float64 array
         The part of it that lies at the model's surface.
     blocked : tuple of (int, int)
-        Pairs of voxels whose meeting cannot be carved: a hinge bracket is in the way.
+        Pairs of voxels whose clash cannot be carved: a hinge bracket is in the way.
     jammed : tuple of int
-        Hinges whose turns make them meet.
+        Hinges whose turns make them clash.
     """
 
-    meetings: tuple[Meeting, ...]
+    clashes: tuple[Clash, ...]
     rings: F64
     lost: F64
     skin: F64
@@ -81,11 +83,36 @@ class Carving:
         return float(self.lost.sum() + (SKIN_COST - 1.0) * self.skin.sum())
 
 
-def _view(
-    meeting: Meeting, system: HingeSystem, row: dict[int, int], size: int
-) -> tuple[list[int], list[list[int]], list[F64], list[F64], int, float]:
-    cells, strides, radii, angles = [], [], [], []
-    for voxel, to in ((meeting.first, meeting.to_first), (meeting.second, meeting.to_second)):
+@dataclass(frozen=True)
+class _PolarView:
+    """The two cells of a clash, seen along its axis: their columns of subvoxels in rings.
+
+    Attributes
+    ----------
+    rows : list of 2 int
+        Rows of the two voxels among those that clash.
+    strides : list of 2 lists of 4 int
+        As ``ClashArrays.stride``.
+    radii, angles : lists of 2 (s * s,) float64 arrays
+        Polar coordinates of each column, lattice units and radians.
+    rings : int
+        Number of rings in which both cells may have a part.
+    low : float
+        Radius at which the first ring begins, lattice units.
+    """
+
+    rows: list[int]
+    strides: list[list[int]]
+    radii: list[F64]
+    angles: list[F64]
+    rings: int
+    low: float
+
+
+def _polar_view(clash: Clash, system: HingeSystem, row: dict[int, int], size: int) -> _PolarView:
+    """See the two cells of a clash along its axis; `size` subvoxels along a side."""
+    rows, strides, radii, angles = [], [], [], []
+    for voxel, to in ((clash.first, clash.to_first), (clash.second, clash.to_second)):
         centre = to[:, :3] @ np.asarray(system.cells)[voxel] + to[:, 3]
         base, stride = 0, []
         for r in range(3):
@@ -97,20 +124,50 @@ def _view(
             stride.append(one)
         steps = (np.arange(size) + 0.5) / size - 0.5
         u, v = np.meshgrid(centre[0] + steps, centre[1] + steps, indexing="ij")
-        cells.append(row[voxel])
+        rows.append(row[voxel])
         strides.append([base, *stride])
         radii.append(np.hypot(u, v).ravel())
         angles.append(np.arctan2(v, u).ravel())
     low = max(radii[0].min(), radii[1].min()) - 0.5 / size
     count = int(np.ceil((min(radii[0].max(), radii[1].max()) - low) * size + 0.5))
-    return cells, strides, radii, angles, max(1, count), float(low)
+    return _PolarView(rows, strides, radii, angles, max(1, count), float(low))
+
+
+def _clash_arrays(views: list[_PolarView], size: int) -> ClashArrays:
+    """All clashes as arrays for the kernel."""
+    rings = np.array([view.rings for view in views], dtype=np.int32)
+    ring = np.empty((len(views), 2, size * size), dtype=np.int32)
+    for e, view in enumerate(views):
+        for side in range(2):
+            number = np.floor((view.radii[side] - view.low) * size).astype(np.int32)
+            ring[e, side] = np.where((number >= 0) & (number < rings[e]), number, -1)
+    return ClashArrays(
+        np.array([view.rows for view in views], dtype=np.int32),
+        np.array([view.strides for view in views], dtype=np.int32),
+        ring,
+        np.array([view.angles for view in views]),
+        rings,
+    )
 
 
 # --- material ----------------------------------------------------------------------------------
 
 
 def skin_of(cells: NDArray[np.int32], material: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Subvoxels of material within `_SKIN_DEPTH` of the model's outside."""
+    """Subvoxels of material that lie at the model's surface.
+
+    Parameters
+    ----------
+    cells : (n, 3) int32 array
+        Cells of shape A.
+    material : (n, s, s, s) bool array
+        Material of each cell.
+
+    Returns
+    -------
+    (n, s, s, s) bool array
+        Material within two subvoxels of the outside.
+    """
     from scipy import ndimage
 
     size = material.shape[1]
@@ -145,6 +202,19 @@ def _brackets(system: HingeSystem, size: int, bracket: tuple[float, float]) -> N
     return out
 
 
+def _weights(
+    material: NDArray[np.bool_], skin: NDArray[np.bool_], held: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Cost of each subvoxel, (n, s, s, s), from material, surface and brackets of that shape."""
+    size = material.shape[1]
+    weight = np.ones(material.shape, dtype=np.float32)
+    middle = np.abs((np.arange(size) + 0.5) / size - 0.5) < CORE_HALF_SIDE
+    weight[:, middle[:, None, None] & middle[:, None] & middle] = CORE_COST
+    weight[skin] = SKIN_COST
+    weight[held] = HINGE_COST
+    return weight
+
+
 def plan_carving(
     system: HingeSystem,
     path: NDArray[np.integer],
@@ -152,26 +222,27 @@ def plan_carving(
     *,
     bracket: tuple[float, float] = BRACKET,
     improve: bool = True,
-) -> Carving:
+) -> CarvingPlan:
     """Choose what to carve so that a path of cores becomes free.
 
     Parameters
     ----------
     system : HingeSystem
+        What folds, on whole cells.
     path : (m, 2) integer array
-        From A: hinge and signed quarter turns about its positive axis.
+        From A: hinge and signed quarter turns about its positive axis, one row a move.
     material : (n, s, s, s) bool array
         Material of each cell in shape A, as in :class:`fabfold.voxels.voxel_model.Voxels`.
     bracket : (float, float)
         Side of the hinges' brackets across the axis, and how far they stay from the ends of the
-        lattice edge; never carved.
+        lattice edge, lattice units; never carved.
     improve : bool
         Improve the first choice, which is good enough to see whether hinges are in the way.
 
     Returns
     -------
-    Carving
-        Without meetings where whole cells pass each other.
+    CarvingPlan
+        Without clashes where whole cells pass each other.
 
     Raises
     ------
@@ -184,36 +255,20 @@ def plan_carving(
         raise ValueError(f"material: wants shape ({count}, s, s, s), found {material.shape}")
     size = material.shape[1]
     nothing = np.zeros(count)
-    found = meetings_on(system, path)
+    found = clashes_on(system, path)
     if not found:
-        return Carving((), np.zeros((0, 2)), nothing, nothing)
+        return CarvingPlan((), np.zeros((0, 2)), nothing, nothing)
     used = sorted({voxel for m in found for voxel in (m.first, m.second)})
     row = {voxel: i for i, voxel in enumerate(used)}
     skin = skin_of(np.asarray(system.cells), material)
     held = _brackets(system, size, bracket)
-    weight = np.ones(material.shape, dtype=np.float32)
-    middle = np.abs((np.arange(size) + 0.5) / size - 0.5) < CORE
-    weight[:, middle[:, None, None] & middle[:, None] & middle] = CORE_COST
-    weight[skin] = SKIN_COST
-    weight[held] = HINGE_COST
+    weight = _weights(material, skin, held)
     claims = (material | held)[used].reshape(len(used), -1).astype(np.uint8)
     before = claims.copy()
-    parts = [_view(m, system, row, size) for m in found]
-    rings = np.array([part[4] for part in parts], dtype=np.int32)
-    ring = np.empty((len(found), 2, size * size), dtype=np.int32)
-    for e, part in enumerate(parts):
-        for side in range(2):
-            number = np.floor((part[2][side] - part[5]) * size).astype(np.int32)
-            ring[e, side] = np.where((number >= 0) & (number < rings[e]), number, -1)
-    views = Views(
-        np.array([part[0] for part in parts], dtype=np.int32),
-        np.array([part[1] for part in parts], dtype=np.int32),
-        ring,
-        np.array([part[3] for part in parts]),
-        rings,
-    )
-    choice, order, paid = choose(
-        views,
+    views = [_polar_view(clash, system, row, size) for clash in found]
+    arrays = _clash_arrays(views, size)
+    choice, order, paid = choose_carving(
+        arrays,
         claims,
         weight[used].reshape(len(used), -1),
         size,
@@ -224,14 +279,14 @@ def plan_carving(
     lost, surface = nothing.copy(), nothing.copy()
     lost[used] = gone.mean(axis=(1, 2, 3))
     surface[used] = (gone & skin[used]).mean(axis=(1, 2, 3))
-    low = np.array([part[5] for part in parts])
+    low = np.array([view.low for view in views])
     # Where all rings give way, no radius is a bound.
     inner = np.where(choice[:, 0] == 0, 0.0, low + choice[:, 0] / size)
-    outer = np.where(choice[:, 1] == rings, np.inf, low + choice[:, 1] / size)
+    outer = np.where(choice[:, 1] == arrays.rings, np.inf, low + choice[:, 1] / size)
     none = choice[:, 0] == choice[:, 1]
     bounds = np.where(none[:, None], 0.0, np.column_stack([inner, outer]))
     bad = [found[e] for e in order.tolist() if paid[e] >= HINGE_COST]
-    return Carving(
+    return CarvingPlan(
         tuple(found[e] for e in order.tolist()),
         bounds[order],
         lost,
@@ -247,27 +302,29 @@ def carved_path(
     expansions: int = 2500,
     patience: int = 400,
     *,
-    carve: float = CORE,
-) -> tuple[NDArray[np.int32], Carving] | None:
+    carve: float = CORE_HALF_SIDE,
+) -> tuple[NDArray[np.int32], CarvingPlan] | None:
     """The path of cores that costs least to carve, of those that several searches find.
 
     Parameters
     ----------
     system : HingeSystem
+        What folds, on whole cells.
     material : (n, s, s, s) bool array
+        Material of each cell in shape A.
     expansions, patience : int
-        Of each search, see :func:`fabfold.fold.lattice_paths.find_path`.
+        Budget of each search, see :func:`fabfold.fold.lattice_planner.find_path`.
     carve : float
-        Half the side of a cell's core.
+        Half the side of a cell's core, lattice units.
 
     Returns
     -------
-    (path, Carving) or None
-        None where no path is found, or none that spares the hinges.
+    (path, CarvingPlan) or None
+        The path as for :func:`plan_carving`; None where none is found that spares the hinges.
     """
-    from fabfold.fold.lattice_paths import find_path
+    from fabfold.fold.lattice_planner import find_path
 
-    best: tuple[NDArray[np.int32], Carving] | None = None
+    best: tuple[NDArray[np.int32], CarvingPlan] | None = None
     seen: set[bytes] = set()
     for price in _PRICES:
         for tried in (patience, patience // 4):

@@ -1,9 +1,9 @@
-"""Pairs of whole cells that run into each other on a path, each in a frame of its own.
+"""Pairs of whole cells that run into each other on a path: the clashes.
 
-Two cells that meet in a quarter turn lie in the same layer along its axis. Turned into one quadrant
-of the plane across it, they run into each other exactly where, on one circle about the axis, a
-point of the one, called *second* here, lies at no smaller an angle than a point of the other, the
-*first*. Which of the two moves no longer matters.
+Two cells that clash in a quarter turn lie in the same layer along its axis. Turned into one
+quadrant of the plane across it, they run into each other exactly where, on one circle about the
+axis, a point of the one, called *second* here, lies at no smaller an angle than a point of the
+other, the *first*. Which of the two moves no longer matters.
 """
 
 # mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
@@ -16,31 +16,37 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.fold.reference import poses, subtree
+from fabfold.fold.system_kinematics import carried_bodies, poses_at
 from fabfold.lattice.sweep import arcs_overlap
 from fabfold.tree.system import HingeSystem
 
-__all__ = ["Meeting", "meetings_on"]
+__all__ = ["Clash", "clashes_on"]
 
 F64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Meeting:
+class Clash:
     """Two whole cells that run into each other in a quarter turn.
 
-    The frame of a meeting has the axis of the turn as its third axis. Both cells are placed in
-    the first quadrant across it, and run into each other where, on one circle, a point of the
-    second lies at no smaller an angle than a point of the first.
+    A clash has a frame of its own: the axis of the turn is its third axis, and both cells are
+    placed in the first quadrant across it. They run into each other where, on one circle, a point
+    of the second lies at no smaller an angle than a point of the first.
 
     Attributes
     ----------
-    move, hinge : int
-        Row of the path, and the hinge that turns (the first, if this happens several times).
-    first, second : int
-        Voxels.
-    to_first, to_second : (3, 4) float64 arrays
-        From shape A to the frame, with the body of each voxel; lattice units.
+    move : int
+        Row of the path, the first one where this happens several times.
+    hinge : int
+        Hinge that turns in that move.
+    first : int
+        Voxel that lies ahead: it is free once it loses all that lies behind the second.
+    second : int
+        Voxel that lies behind: it is free once it loses all that lies ahead of the first.
+    to_first : (3, 4) float64 array
+        Rigid transform from shape A to the frame with the body of the first voxel, lattice units.
+    to_second : (3, 4) float64 array
+        The same with the body of the second voxel.
     """
 
     move: int
@@ -53,6 +59,7 @@ class Meeting:
 
 @njit(cache=True)
 def _overlaps(first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether the arcs of pairs of squares (p, 2) overlap, shape (p,); see `arcs_overlap`."""
     out = np.zeros(len(first), np.bool_)
     for i in range(len(first)):
         out[i] = arcs_overlap(first[i, 0], first[i, 1], second[i, 0], second[i, 1])
@@ -70,28 +77,34 @@ def _placed(pose: F64, frame: F64) -> F64:
     return np.asarray(np.rint(2 * frame @ pose) / 2 + 0.0)
 
 
-def meetings_on(system: HingeSystem, path: NDArray[np.integer]) -> list[Meeting]:
+def clashes_on(system: HingeSystem, path: NDArray[np.integer]) -> list[Clash]:
     """Every distinct way in which two whole cells run into each other on a path.
 
     Parameters
     ----------
     system : HingeSystem
+        What folds, on whole cells.
     path : (m, 2) integer array
-        From A: hinge and signed quarter turns about its positive axis.
+        From A: hinge and signed quarter turns about its positive axis, one row a move.
+
+    Returns
+    -------
+    list of Clash
+        In the order of the path; empty where whole cells pass each other.
     """
     q = np.zeros(len(system.parent))
     body = np.asarray(system.body, dtype=int)
-    found: dict[tuple[object, ...], Meeting] = {}
+    found: dict[tuple[object, ...], Clash] = {}
     for move, (hinge, turns) in enumerate(np.asarray(path, dtype=int).reshape(-1, 2).tolist()):
-        carried = subtree(system, hinge)[body]
+        carried = carried_bodies(system.parent, hinge)[body]
         way = 1 if turns > 0 else -1
         for _ in range(abs(turns)):
             # A turn back sweeps what the turn forth from its end sweeps.
-            pose = poses(system, q if way > 0 else q - np.eye(len(q))[hinge])
+            pose = poses_at(system, q if way > 0 else q - np.eye(len(q))[hinge])
             q[hinge] += way
             frame = _axis_frame(system, pose, hinge)
-            for meeting in _meetings_in_turn(system, pose, frame, carried, move, hinge):
-                found.setdefault(_key(meeting), meeting)
+            for clash in _clashes_in_turn(system, pose, frame, carried, move, hinge):
+                found.setdefault(_key(clash), clash)
     return list(found.values())
 
 
@@ -107,14 +120,15 @@ def _axis_frame(system: HingeSystem, pose: F64, hinge: int) -> F64:
     return frame
 
 
-def _meetings_in_turn(
+def _clashes_in_turn(
     system: HingeSystem,
     pose: F64,
     frame: F64,
     carried: NDArray[np.bool_],
     move: int,
     hinge: int,
-) -> list[Meeting]:
+) -> list[Clash]:
+    """Clashes of one quarter turn; `pose` is that before a turn forward."""
     body = np.asarray(system.body, dtype=int)
     world = np.einsum("nij,nj->ni", pose[body][:, :3, :3], system.cells) + pose[body][:, :3, 3]
     corner = np.rint(2 * (world @ frame[:, :3].T + frame[:, 3])).astype(int)
@@ -139,7 +153,7 @@ def _meetings_in_turn(
         hit = _overlaps(square[one], square[other])
         for first, second in zip(one[hit].tolist(), other[hit].tolist(), strict=True):
             out.append(
-                Meeting(
+                Clash(
                     move,
                     hinge,
                     first,
@@ -151,10 +165,10 @@ def _meetings_in_turn(
     return out
 
 
-def _key(meeting: Meeting) -> tuple[object, ...]:
-    """Equal for meetings that are the same seen from the two bodies."""
-    one, other = meeting.to_first.copy(), meeting.to_second.copy()
-    first, second = meeting.first, meeting.second
+def _key(clash: Clash) -> tuple[object, ...]:
+    """Equal for clashes that are the same seen from the two bodies."""
+    one, other = clash.to_first.copy(), clash.to_second.copy()
+    first, second = clash.first, clash.second
     if first > second:
         # Seen from the other end of the axis, angles run back from 90° and the two change places.
         flip = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])

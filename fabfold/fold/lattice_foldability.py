@@ -1,4 +1,7 @@
-"""The folding stage's answer to the tree search, whether a tree folds."""
+"""Whether a tree folds: the answer of the lattice planner to the tree search.
+
+The tree search asks through a protocol (:mod:`fabfold.tree.foldability`); this implements it.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,13 @@ from fabfold.tree.foldability import PlannerEstimate
 from fabfold.tree.system import HingeSystem
 
 if TYPE_CHECKING:
-    from fabfold.fold.lattice_paths import Plan
+    from fabfold.fold.lattice_planner import PlannerResult
 
-__all__ = ["LITTLE", "NEAR", "LatticeFoldability", "octants_of"]
+__all__ = ["LatticeFoldability", "octants_of"]
 
-#: Quarter turns, and the share of all, that the planner may leave with whole cells for a look at
-#: cores.
-LITTLE, NEAR = 4, 0.3
+#: Cores are worth a look where the planner leaves no more than this with whole cells: quarter
+#: turns, or share of all quarter turns.
+_FEW_TURNS, _FEW_SHARE = 4, 0.3
 
 
 def octants_of(subvoxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -57,9 +60,10 @@ class LatticeFoldability:
         the bodies.
     carve : float, optional
         For trees that fold only once cells lose corners: half the side of the core that is to be
-        left of a cell, :data:`fabfold.fold.cores.CORE`. The closure test then looks at cores; the
-        planner looks at whole cells first, and at cores where it leaves little. Not together with
-        `octants`. A system whose voxels share cells brings its own octants and is not carved.
+        left of a cell, :data:`fabfold.fold.core_sweep.CORE_HALF_SIDE`, lattice units. The closure
+        test then looks at cores; the planner looks at whole cells first, and at cores where it
+        leaves little. Not together with `octants`. A system whose voxels share cells brings its
+        own octants and is not carved.
     material : (n, s, s, s) bool array, optional
         With `carve`: material of the cells in shape A. Paths that cannot be carved without
         cutting a hinge then do not count, and of several the one that costs least is taken.
@@ -72,19 +76,25 @@ class LatticeFoldability:
     material: NDArray[np.bool_] | None = field(default=None, compare=False)
 
     def _seen(self, system: HingeSystem) -> HingeSystem:
-        from fabfold.fold.lattice_paths import refined
+        """The system as the planner sees it: on half cells where octants count."""
+        from fabfold.fold.lattice_planner import refined
 
         return system if self.octants is None else refined(system, self.octants)
 
-    def stuck(self, system: HingeSystem) -> tuple[int, int]:
-        """Hinges that the closure test cannot move, from A and from B."""
-        from fabfold.fold.lattice_paths import closure
-
-        return closure(self._seen(system), carve=self.carve)
-
     def stuck_hinges(self, system: HingeSystem) -> NDArray[np.bool_]:
-        """Which hinges the closure test cannot move, from A and from B, shape (2, h)."""
-        from fabfold.fold.lattice_paths import stuck_hinges
+        """Which hinges the closure test cannot move.
+
+        Parameters
+        ----------
+        system : HingeSystem
+            What is to fold.
+
+        Returns
+        -------
+        (2, h) bool array
+            From shape A, and from shape B.
+        """
+        from fabfold.fold.lattice_planner import stuck_hinges
 
         return stuck_hinges(self._seen(system), carve=self.carve)
 
@@ -96,50 +106,41 @@ class LatticeFoldability:
         Parameters
         ----------
         system : HingeSystem
+            What is to fold.
         expansions : int
             The planner gives up after this many expansions without progress.
         guide : (g, 5) int32 array, optional
             Steps found for a similar system, to be tried first.
-        """
-        found = self._look(system, expansions, guide)
-        return PlannerEstimate(found.apart, found.guide)
-
-    def unresolved(self, system: HingeSystem, expansions: int) -> float:
-        """Share of the quarter turns that the planner could not resolve.
-
-        Parameters
-        ----------
-        system : HingeSystem
-        expansions : int
-            The planner gives up after this many expansions without progress.
 
         Returns
         -------
-        float
-            0.0 when it folds, up to 1.0 when nothing moves.
+        PlannerEstimate
+            Quarter turns of each hinge that are left, and the steps found.
         """
-        found = self._look(system, expansions)
-        return found.levels / found.total if found.total else float(found.levels > 0)
+        found = self._plan(system, expansions, guide)
+        return PlannerEstimate(found.apart, found.guide)
 
-    def _look(
+    def _plan(
         self, system: HingeSystem, expansions: int, guide: NDArray[np.int32] | None = None
-    ) -> Plan:
-        """One look of the planner, at whole cells first and then at cores if it is worth it."""
-        from fabfold.fold.lattice_paths import find_path
+    ) -> PlannerResult:
+        """Plan once, with whole cells first and then with cores if it is worth it."""
+        from fabfold.fold.lattice_planner import find_path
 
         patience = min(expansions, self.patience)
         seen = self._seen(system)
         found = find_path(seen, self.expansions, patience, short=False, guide=guide)
         if self.carve is None or system.octants is not None:
             return found
-        if not 0 < found.levels <= max(LITTLE, NEAR * found.total):
+        if not 0 < found.remaining <= max(_FEW_TURNS, _FEW_SHARE * found.total):
             return found
-        cored = self._look_at_cores(system, patience, found.guide)
-        return cored if cored.levels < found.levels else found
+        cored = self._plan_with_cores(system, patience, found.guide)
+        return cored if cored.remaining < found.remaining else found
 
-    def _look_at_cores(self, system: HingeSystem, patience: int, guide: NDArray[np.int32]) -> Plan:
-        """Hinges that carving would cut count as not resolved."""
-        from fabfold.fold.lattice_paths import find_path
+    def _plan_with_cores(
+        self, system: HingeSystem, patience: int, guide: NDArray[np.int32]
+    ) -> PlannerResult:
+        """Plan with cores; hinges that carving would cut count as not resolved."""
+        from fabfold.fold.lattice_planner import find_path
 
         sparing = self.material is not None
         found = find_path(
@@ -154,7 +155,7 @@ class LatticeFoldability:
             return found
         apart = found.apart.copy()
         apart[jammed] = 1
-        return found._replace(levels=len(jammed), path=None, apart=apart)
+        return found._replace(remaining=len(jammed), path=None, apart=apart)
 
     def path(
         self, system: HingeSystem, guide: NDArray[np.int32] | None = None
@@ -167,6 +168,7 @@ class LatticeFoldability:
         Parameters
         ----------
         system : HingeSystem
+            What is to fold.
         guide : (g, 5) int32 array, optional
             Steps that :meth:`estimate` found for the system, to be tried first.
 
@@ -175,7 +177,7 @@ class LatticeFoldability:
         (m, 2) int32 array or None
             One row a move from A to B: hinge, and signed quarter turns about its positive axis.
         """
-        from fabfold.fold.lattice_paths import find_path
+        from fabfold.fold.lattice_planner import find_path
 
         seen = self._seen(system)
         looks = (self.patience, self.patience // 4, self.patience // 10)

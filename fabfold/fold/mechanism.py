@@ -1,4 +1,4 @@
-"""A hinge system made ready for the kernels, and where its cells are in a lattice state.
+"""A hinge system made ready for the search kernels.
 
 The bodies are renumbered: the tree is hung on its middle body, so that the smaller side of every
 hinge is the one that moves, and bodies are numbered depth first, so that what hinge ``k`` moves is
@@ -18,12 +18,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.lattice.rotations import ROTATION_PRODUCT, ROTATIONS, rotation_about, rotation_index
+from fabfold.fold.link_plates import link_plates
+from fabfold.lattice.rotations import ROTATIONS, rotation_about, rotation_index
 from fabfold.tree.system import HingeSystem
 
-__all__ = ["Mechanism", "Scene", "clear_scene", "mechanism", "pose_scene", "scene"]
+__all__ = ["Mechanism", "mechanism"]
 
 I32 = NDArray[np.int32]
+F64 = NDArray[np.float64]
 
 #: Index in ROTATIONS of q quarter turns about the positive axis, shape (3, 4).
 QUARTERS: I32 = np.array(
@@ -38,6 +40,8 @@ QUARTERS: I32 = np.array(
 class Mechanism(NamedTuple):
     """A hinge system hung on its middle body, bodies numbered depth first.
 
+    All lengths are in lattice units: a voxel's side is 1.
+
     Attributes
     ----------
     cell : (n, 3) int32 array
@@ -49,25 +53,25 @@ class Mechanism(NamedTuple):
     end : (h,) int32 array
         Hinge ``k`` moves the bodies ``k + 1`` to ``end[k] - 1``.
     axis : (h,) int32 array
-        0, 1 or 2.
+        Lattice axis along which the hinge's edge runs in A: 0, 1 or 2.
     pivot : (h, 3) int32 array
         Twice the middle of the hinge's lattice edge in A.
     sign : (h,) int32 array
         +1 or -1: sense of one step about the positive axis, of the side that moves here.
     steps : (h,) int32 array
-        Quarter turns from A to B.
+        Quarter turns from A to B, at most 3.
     turn_rotation : (h, 4) int32 array
         Index in ROTATIONS of the turn by 0 to 3 steps.
     turn_shift : (h, 4, 3) int32 array
-        Its translation.
+        Translation of that turn, which is about the hinge's axis and not about the origin.
     barrel : (m, 5) int32 array
         Unit lattice edges that carry hinges: hinge, axis, and twice the middle in A.
-    plate : (m, 5) int32 array
+    plate : (p, 5) int32 array
         Unit lattice faces that are link plates: body, axis of the normal, and twice the middle.
     origin : (h,) int32 array
-        Which hinge of the system this is.
+        Hinge of the system that this hinge is.
     body : (b,) int32 array
-        Which body of the system this is.
+        Body of the system that this body is.
     reach : int
         No cell ever comes further than this from the origin of the middle body's frame.
     span : int
@@ -83,7 +87,7 @@ class Mechanism(NamedTuple):
     sign: I32
     steps: I32
     turn_rotation: I32
-    turn_shift: NDArray[np.int32]
+    turn_shift: I32
     barrel: I32
     plate: I32
     origin: I32
@@ -93,43 +97,24 @@ class Mechanism(NamedTuple):
 
 
 @njit(cache=True)
-def _plate(first, axis1, second, axis2, middle):  # type: ignore[no-untyped-def]
-    """Axis of the normal of the face with two given edges, -1 where there is none."""
-    side = 2 if first[axis1] % 2 == 0 else 4
-    middle[:] = first
-    if axis1 == axis2:
-        other = -1
-        for i in range(3):
-            if first[i] != second[i]:
-                if other >= 0 or i == axis1 or abs(first[i] - second[i]) != side:
-                    return -1
-                other = i
-        if other < 0:
-            return -1
-        middle[other] = (first[other] + second[other]) // 2
-        return 3 - axis1 - other
-    normal = 3 - axis1 - axis2
-    if (
-        first[normal] != second[normal]
-        or 2 * abs(first[axis1] - second[axis1]) != side
-        or 2 * abs(first[axis2] - second[axis2]) != side
-    ):
-        return -1
-    middle[axis2] = second[axis2]
-    return normal
+def _middle_body(weight: I32, parent: I32, total: int) -> int:
+    """Body of which no side holds more than half of all cells.
 
+    Parameters
+    ----------
+    weight : (b,) int32 array
+        Number of cells of each body.
+    parent : (h,) int32 array
+        Body that each hinge of the system turns against.
+    total : int
+        Number of all cells.
 
-@njit(cache=True)
-def _prepare(  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one straight pass
-    cells, body, parent, point2, axis, turns
-):
+    Returns
+    -------
+    int
+        Body, in the system's numbers.
+    """
     hinges = len(parent)
-    bodies = hinges + 1
-    # The middle body: no side of it holds more than half of the cells.
-    weight = np.zeros(bodies, np.int32)
-    for i in body:
-        weight[i] += 1
-    total = len(cells)
     below = weight.copy()
     for h in range(hinges - 1, -1, -1):
         below[parent[h]] += below[h + 1]
@@ -142,21 +127,42 @@ def _prepare(  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one st
                 middle = h + 1
                 going = True
                 break
+    return middle
 
-    # Depth first from the middle body.
+
+@njit(cache=True)
+def _depth_first(parent: I32, root: int) -> tuple[I32, I32, I32]:
+    """Number the bodies depth first from a root.
+
+    Parameters
+    ----------
+    parent : (h,) int32 array
+        Body that each hinge of the system turns against.
+    root : int
+        Body of the system to begin at.
+
+    Returns
+    -------
+    order : (b,) int32 array
+        Bodies of the system in their new order.
+    hung_on : (b,) int32 array
+        Body that each body of the system hangs on now; -1 for the root.
+    hung_by : (b,) int32 array
+        Hinge of the system that carries each body now; -1 for the root.
+    """
+    hinges = len(parent)
+    bodies = hinges + 1
     order = np.zeros(bodies, np.int32)
-    number = np.full(bodies, -1, np.int32)
-    by = np.full(bodies, -1, np.int32)  # hinge that carries the body, in the system's numbers
+    hung_on = np.full(bodies, -1, np.int32)
+    hung_by = np.full(bodies, -1, np.int32)
     stack = np.zeros(bodies, np.int32)
-    came = np.full(bodies, -1, np.int32)
-    stack[0] = middle
+    stack[0] = root
     depth = 1
     count = 0
     while depth > 0:
         depth -= 1
         b = stack[depth]
         order[count] = b
-        number[b] = count
         count += 1
         for h in range(hinges - 1, -1, -1):
             other = -1
@@ -164,145 +170,266 @@ def _prepare(  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one st
                 other = h + 1
             elif h + 1 == b:
                 other = parent[h]
-            if other >= 0 and other != came[b]:
-                came[other] = b
-                by[other] = h
+            if other >= 0 and other != hung_on[b]:
+                hung_on[other] = b
+                hung_by[other] = h
                 stack[depth] = other
                 depth += 1
+    return order, hung_on, hung_by
 
-    first = np.zeros(bodies + 1, np.int32)
-    for i in range(bodies):
+
+@njit(cache=True)
+def _cells_by_body(cells: I32, body: I32, weight: I32, order: I32, number: I32) -> tuple[I32, I32]:
+    """Sort the cells by the new numbers of their bodies.
+
+    Parameters
+    ----------
+    cells : (n, 3) int32 array
+        Cells in A.
+    body : (n,) int32 array
+        Body of each cell, in the system's numbers.
+    weight : (b,) int32 array
+        Number of cells of each body of the system.
+    order : (b,) int32 array
+        Bodies of the system in their new order.
+    number : (b,) int32 array
+        New number of each body of the system.
+
+    Returns
+    -------
+    cell, first
+        As in :class:`Mechanism`.
+    """
+    first = np.zeros(len(order) + 1, np.int32)
+    for i in range(len(order)):
         first[i + 1] = first[i] + weight[order[i]]
-    cell = np.zeros((total, 3), np.int32)
+    cell = np.zeros((len(cells), 3), np.int32)
     fill = first.copy()
-    for v in range(total):
+    for v in range(len(cells)):
         i = number[body[v]]
         cell[fill[i]] = cells[v]
         fill[i] += 1
+    return cell, first
 
-    up = np.zeros(hinges, np.int32)
-    end = np.zeros(hinges, np.int32)
-    ax = np.zeros(hinges, np.int32)
-    pivot = np.zeros((hinges, 3), np.int32)
-    sign = np.zeros(hinges, np.int32)
-    steps = np.zeros(hinges, np.int32)
-    origin = np.zeros(hinges, np.int32)
+
+@njit(cache=True)
+def _turns_of(axis: I32, pivot: I32, sign: I32) -> tuple[I32, I32]:
+    """Rotation and translation of 0 to 3 steps of every hinge.
+
+    Parameters
+    ----------
+    axis, pivot, sign
+        As in :class:`Mechanism`.
+
+    Returns
+    -------
+    turn_rotation, turn_shift
+        As in :class:`Mechanism`.
+    """
+    hinges = len(axis)
     rotation = np.zeros((hinges, 4), np.int32)
     shift = np.zeros((hinges, 4, 3), np.int32)
-    last = np.arange(1, bodies + 1).astype(np.int32)
-    for k in range(hinges - 1, -1, -1):
-        h = by[order[k + 1]]
-        origin[k] = h
-        up[k] = number[came[order[k + 1]]]
-        last[up[k]] = max(last[up[k]], last[k + 1])
-        end[k] = last[k + 1]
-        ax[k] = axis[h]
-        pivot[k] = point2[h]
-        steps[k] = abs(turns[h])
-        sign[k] = 1 if turns[h] >= 0 else -1
-        if h + 1 != order[k + 1]:
-            sign[k] = -sign[k]  # seen from the child, the parent turns the other way
+    for k in range(hinges):
         for s in range(4):
-            rotation[k, s] = QUARTERS[ax[k], (sign[k] * s) % 4]
+            rotation[k, s] = QUARTERS[axis[k], (sign[k] * s) % 4]
             matrix = ROTATIONS[rotation[k, s]]
             for i in range(3):
                 moved = 0
                 for j in range(3):
                     moved += matrix[i, j] * pivot[k, j]
                 shift[k, s, i] = (pivot[k, i] - moved) // 2
+    return rotation, shift
 
-    # How far anything can come, along the chain of hinges.
+
+@njit(cache=True)
+def _from_hinge(cell: I32, pivot: I32) -> float:
+    """Distance of a cell's centre from the middle of a hinge's edge; both (3,), `pivot` doubled."""
+    square = 0.0
+    for a in range(3):
+        square += (cell[a] - 0.5 * pivot[a]) ** 2
+    return np.sqrt(square)
+
+
+@njit(cache=True)
+def _between_hinges(one: I32, two: I32) -> float:
+    """Distance of the middles of two hinges' edges, both (3,) and doubled."""
+    square = 0.0
+    for a in range(3):
+        square += (0.5 * (one[a] - two[a])) ** 2
+    return np.sqrt(square)
+
+
+@njit(cache=True)
+def _reach(cell: I32, first: I32, up: I32, pivot: I32) -> float:
+    """How far anything can come from the origin: the chain of hinges, pulled straight.
+
+    Parameters
+    ----------
+    cell, first, up, pivot
+        As in :class:`Mechanism`.
+
+    Returns
+    -------
+    float
+        Bound of the distance of any cell's centre or hinge, in any state.
+    """
+    hinges = len(up)
+    origin = np.zeros(3, np.int32)
     far = np.zeros(hinges, np.float64)
     reach = 0.0
-    for i in range(bodies):
+    for i in range(hinges + 1):
+        near = origin if i == 0 else pivot[i - 1]
+        so_far = 0.0 if i == 0 else far[i - 1]
         for v in range(first[i], first[i + 1]):
-            length = 0.0
-            for a in range(3):
-                if i == 0:
-                    length += float(cell[v, a]) ** 2
-                else:
-                    length += (cell[v, a] - 0.5 * pivot[i - 1, a]) ** 2
-            reach = max(reach, np.sqrt(length) + (far[i - 1] if i > 0 else 0.0))
+            reach = max(reach, _from_hinge(cell[v], near) + so_far)
         for k in range(hinges):
             if up[k] == i:
-                length = 0.0
-                for a in range(3):
-                    if i == 0:
-                        length += (0.5 * pivot[k, a]) ** 2
-                    else:
-                        length += (0.5 * (pivot[k, a] - pivot[i - 1, a])) ** 2
-                far[k] = np.sqrt(length) + (far[i - 1] if i > 0 else 0.0)
+                far[k] = _between_hinges(pivot[k], near) + so_far
                 reach = max(reach, far[k])
+    return reach
 
+
+@njit(cache=True)
+def _span(cell: I32, first: I32, up: I32, pivot: I32) -> float:
+    """How far anything that a hinge moves can come from that hinge.
+
+    Parameters
+    ----------
+    cell, first, up, pivot
+        As in :class:`Mechanism`.
+
+    Returns
+    -------
+    float
+        The greatest such bound of all hinges.
+    """
+    hinges = len(up)
     span = 0.0
     down = np.zeros(hinges, np.float64)
     for k in range(hinges - 1, -1, -1):
         for v in range(first[k + 1], first[k + 2]):
-            length = 0.0
-            for a in range(3):
-                length += (cell[v, a] - 0.5 * pivot[k, a]) ** 2
-            down[k] = max(down[k], np.sqrt(length))
+            down[k] = max(down[k], _from_hinge(cell[v], pivot[k]))
         for j in range(k + 1, hinges):
             if up[j] == k + 1:
-                length = 0.0
-                for a in range(3):
-                    length += (0.5 * (pivot[k, a] - pivot[j, a])) ** 2
-                down[k] = max(down[k], np.sqrt(length) + down[j])
+                down[k] = max(down[k], _between_hinges(pivot[k], pivot[j]) + down[j])
         span = max(span, down[k])
+    return span
 
-    # A hinge covers one lattice edge, or two halves of one on a finer lattice.
+
+@njit(cache=True)
+def _barrels_of(axis: I32, pivot: I32) -> I32:
+    """Unit edges of the hinges: one each, or two halves of one on a lattice of half cells.
+
+    Parameters
+    ----------
+    axis, pivot
+        As in :class:`Mechanism`.
+
+    Returns
+    -------
+    (m, 5) int32 array
+        ``Mechanism.barrel``.
+    """
+    hinges = len(axis)
     edges = 0
     for k in range(hinges):
-        edges += 1 if pivot[k, ax[k]] % 2 == 0 else 2
+        edges += 1 if pivot[k, axis[k]] % 2 == 0 else 2
     barrel = np.zeros((edges, 5), np.int32)
     edges = 0
     for k in range(hinges):
-        whole = pivot[k, ax[k]] % 2 == 0
+        whole = pivot[k, axis[k]] % 2 == 0
         for half in range(1 if whole else 2):
             barrel[edges, 0] = k
-            barrel[edges, 1] = ax[k]
+            barrel[edges, 1] = axis[k]
             barrel[edges, 2:] = pivot[k]
             if not whole:
-                barrel[edges, 2 + ax[k]] += 2 * half - 1
+                barrel[edges, 2 + axis[k]] += 2 * half - 1
             edges += 1
+    return barrel
 
-    # A body without cells between two hinges on edges of one face is a link plate.
-    plate = np.zeros((4 * bodies, 5), np.int32)
-    faces = 0
-    middle_of = np.zeros(3, np.int32)
-    for h in range(hinges):
-        if weight[h + 1] > 0:
-            continue
-        child = -1
-        more = False
-        for g in range(h + 1, hinges):
-            if parent[g] == h + 1:
-                more = child >= 0
-                child = g
-        if child < 0 or more:
-            continue
-        normal = _plate(point2[h], axis[h], point2[child], axis[child], middle_of)
-        if normal < 0:
-            continue
-        whole = point2[h, axis[h]] % 2 == 0
-        for part in range(1 if whole else 4):
-            plate[faces, 0] = number[h + 1]
-            plate[faces, 1] = normal
-            plate[faces, 2:] = middle_of
-            if not whole:
-                plate[faces, 2 + (normal + 1) % 3] += 2 * (part % 2) - 1
-                plate[faces, 2 + (normal + 2) % 3] += 2 * (part // 2) - 1
-            faces += 1
-    plate = plate[:faces].copy()
-    bodies_of = order
-    return (
-        cell, first, up, end, ax, pivot, sign, steps, rotation, shift, barrel, plate, origin,
-        bodies_of, int(np.ceil(reach)) + 3, int(np.ceil(span)) + 2,
-    )  # fmt: skip
+
+@njit(cache=True)
+def _hung_on_its_middle(
+    cells: I32, body: I32, parent: I32, point2: I32, axis: I32, turns: I32
+) -> Mechanism:
+    """Mechanism of a system whose cells and hinges are given about the origin.
+
+    Parameters
+    ----------
+    cells, body, parent, point2, axis, turns
+        As in :class:`fabfold.tree.system.HingeSystem`, all int32.
+
+    Returns
+    -------
+    Mechanism
+        Ready for the kernels.
+    """
+    hinges = len(parent)
+    weight = np.zeros(hinges + 1, np.int32)
+    for i in body:
+        weight[i] += 1
+    order, hung_on, hung_by = _depth_first(parent, _middle_body(weight, parent, len(cells)))
+    number = np.zeros(hinges + 1, np.int32)
+    for i in range(hinges + 1):
+        number[order[i]] = i
+    cell, first = _cells_by_body(cells, body, weight, order, number)
+
+    origin = np.zeros(hinges, np.int32)
+    up = np.zeros(hinges, np.int32)
+    end = np.zeros(hinges, np.int32)
+    own_axis = np.zeros(hinges, np.int32)
+    pivot = np.zeros((hinges, 3), np.int32)
+    sign = np.zeros(hinges, np.int32)
+    steps = np.zeros(hinges, np.int32)
+    last = np.arange(1, hinges + 2).astype(np.int32)
+    for k in range(hinges - 1, -1, -1):
+        b = order[k + 1]
+        h = hung_by[b]
+        origin[k] = h
+        up[k] = number[hung_on[b]]
+        last[up[k]] = max(last[up[k]], last[k + 1])
+        end[k] = last[k + 1]
+        own_axis[k] = axis[h]
+        pivot[k] = point2[h]
+        steps[k] = abs(turns[h])
+        sign[k] = 1 if turns[h] >= 0 else -1
+        if h + 1 != b:
+            sign[k] = -sign[k]  # seen from the child, the parent turns the other way
+    rotation, shift = _turns_of(own_axis, pivot, sign)
+    reach = _reach(cell, first, up, pivot)
+    span = _span(cell, first, up, pivot)
+    return Mechanism(
+        cell,
+        first,
+        up,
+        end,
+        own_axis,
+        pivot,
+        sign,
+        steps,
+        rotation,
+        shift,
+        _barrels_of(own_axis, pivot),
+        link_plates(weight, parent, point2, axis, number),
+        origin,
+        order,
+        int(np.ceil(reach)) + 3,
+        int(np.ceil(span)) + 2,
+    )
 
 
 def mechanism(system: HingeSystem) -> Mechanism:
     """Make a hinge system ready for the kernels.
+
+    Parameters
+    ----------
+    system : HingeSystem
+        Bodies, cells and hinges in shape A.
+
+    Returns
+    -------
+    Mechanism
+        The same, hung on its middle body and moved so that A is about the origin.
 
     Raises
     ------
@@ -324,153 +451,11 @@ def mechanism(system: HingeSystem) -> Mechanism:
     cells = np.asarray(system.cells, dtype=np.int32).reshape(-1, 3)
     # The middle of A at the origin keeps the grids small.
     middle = (cells.min(axis=0) + cells.max(axis=0)) // 2 if len(cells) else np.zeros(3, np.int32)
-    return Mechanism(
-        *_prepare(
-            np.ascontiguousarray(cells - middle, dtype=np.int32),
-            np.ascontiguousarray(system.body, dtype=np.int32),
-            parent,
-            np.ascontiguousarray(point2 - 2 * middle, dtype=np.int32),
-            axis,
-            np.asarray(system.turns, dtype=np.int32),
-        )
+    return _hung_on_its_middle(
+        np.ascontiguousarray(cells - middle, dtype=np.int32),
+        np.ascontiguousarray(system.body, dtype=np.int32),
+        parent,
+        np.ascontiguousarray(point2 - 2 * middle, dtype=np.int32),
+        axis,
+        np.asarray(system.turns, dtype=np.int32),
     )
-
-
-class Scene(NamedTuple):
-    """Where everything is in one lattice state; filled by :func:`pose_scene`.
-
-    Attributes
-    ----------
-    rotation : (b,) int32 array
-    shift : (b, 3) int32 array
-        Pose of every body: ``cell -> ROTATIONS[rotation] @ cell + shift``.
-    world : (n, 3) int32 array
-        Cells, moved by the reach so that no coordinate is negative.
-    edge : (m, 4) int32 array
-        Unit edges of the barrels: axis and twice the middle, moved likewise.
-    grid : (s * s * s,) int16 array
-        1 + body of the cell, 0 where empty.
-    edges : (3 * s * s * s,) int16 array
-        1 + hinge of the lattice edge that begins at each corner, by axis; 0 where there is none.
-    face : (m, 4) int32 array
-        Unit faces of the plates: axis of the normal and twice the middle, moved likewise.
-    faces : (3 * s * s * s,) int16 array
-        1 + body of the plate on each lattice face, as `edges`; of no size where there is none.
-    """
-
-    rotation: I32
-    shift: I32
-    world: I32
-    edge: I32
-    grid: NDArray[np.int16]
-    edges: NDArray[np.int16]
-    face: I32
-    faces: NDArray[np.int16]
-
-
-@njit(cache=True)
-def scene(mech: Mechanism) -> Scene:
-    """Empty scene for a mechanism."""
-    side = 2 * mech.reach + 1
-    return Scene(
-        np.zeros(len(mech.up) + 1, np.int32),
-        np.zeros((len(mech.up) + 1, 3), np.int32),
-        np.zeros((len(mech.cell), 3), np.int32),
-        np.zeros((len(mech.barrel), 4), np.int32),
-        np.zeros(side * side * side, np.int16),
-        np.zeros(3 * side * side * side, np.int16),
-        np.zeros((len(mech.plate), 4), np.int32),
-        np.zeros(3 * side * side * side if len(mech.plate) > 0 else 0, np.int16),
-    )
-
-
-@njit(cache=True)
-def edge_slot(side: int, axis: int, x2: int, y2: int, z2: int) -> int:
-    """Index in ``Scene.edges`` of the unit edge along `axis` with the given doubled middle.
-
-    The same for ``Scene.faces``, with the axis of the face's normal.
-    """
-    return ((axis * side + (x2 >> 1)) * side + (y2 >> 1)) * side + (z2 >> 1)
-
-
-@njit(cache=True)
-def clear_scene(mech: Mechanism, at: Scene) -> None:
-    """Empty the grids again, touching only what was filled."""
-    side = 2 * mech.reach + 1
-    for v in range(len(at.world)):
-        at.grid[(at.world[v, 0] * side + at.world[v, 1]) * side + at.world[v, 2]] = 0
-    for e in range(len(at.edge)):
-        at.edges[edge_slot(side, at.edge[e, 0], at.edge[e, 1], at.edge[e, 2], at.edge[e, 3])] = 0
-    for p in range(len(at.face)):
-        at.faces[edge_slot(side, at.face[p, 0], at.face[p, 1], at.face[p, 2], at.face[p, 3])] = 0
-
-
-@njit(cache=True)
-def pose_scene(mech: Mechanism, at: Scene, q: NDArray[np.int8]) -> bool:
-    """Put everything where it is in state `q`; the grids must be empty.
-
-    Returns
-    -------
-    bool
-        False when two cells coincide, two barrels lie on one lattice edge or two plates on one
-        lattice face.
-    """
-    reach = mech.reach
-    side = 2 * reach + 1
-    good = True
-    at.rotation[0] = 0
-    at.shift[0, :] = 0
-    for k in range(len(mech.up)):
-        p = mech.up[k]
-        r = at.rotation[p]
-        at.rotation[k + 1] = ROTATION_PRODUCT[r, mech.turn_rotation[k, q[k]]]
-        for i in range(3):
-            total = at.shift[p, i]
-            for j in range(3):
-                total += ROTATIONS[r, i, j] * mech.turn_shift[k, q[k], j]
-            at.shift[k + 1, i] = total
-    for b in range(len(mech.up) + 1):
-        r = at.rotation[b]
-        for v in range(mech.first[b], mech.first[b + 1]):
-            for i in range(3):
-                at.world[v, i] = at.shift[b, i] + reach + (
-                    ROTATIONS[r, i, 0] * mech.cell[v, 0]
-                    + ROTATIONS[r, i, 1] * mech.cell[v, 1]
-                    + ROTATIONS[r, i, 2] * mech.cell[v, 2]
-                )  # fmt: skip
-            slot = (at.world[v, 0] * side + at.world[v, 1]) * side + at.world[v, 2]
-            if at.grid[slot] != 0:
-                good = False
-            at.grid[slot] = b + 1
-    for e in range(len(mech.barrel)):
-        k = mech.barrel[e, 0]
-        b = k + 1
-        r = at.rotation[b]
-        for i in range(3):
-            at.edge[e, 1 + i] = 2 * (at.shift[b, i] + reach) + (
-                ROTATIONS[r, i, 0] * mech.barrel[e, 2]
-                + ROTATIONS[r, i, 1] * mech.barrel[e, 3]
-                + ROTATIONS[r, i, 2] * mech.barrel[e, 4]
-            )
-            if ROTATIONS[r, i, mech.barrel[e, 1]] != 0:
-                at.edge[e, 0] = i
-        slot = edge_slot(side, at.edge[e, 0], at.edge[e, 1], at.edge[e, 2], at.edge[e, 3])
-        if at.edges[slot] != 0:
-            good = False
-        at.edges[slot] = k + 1
-    for p in range(len(mech.plate)):
-        b = mech.plate[p, 0]
-        r = at.rotation[b]
-        for i in range(3):
-            at.face[p, 1 + i] = 2 * (at.shift[b, i] + reach) + (
-                ROTATIONS[r, i, 0] * mech.plate[p, 2]
-                + ROTATIONS[r, i, 1] * mech.plate[p, 3]
-                + ROTATIONS[r, i, 2] * mech.plate[p, 4]
-            )
-            if ROTATIONS[r, i, mech.plate[p, 1]] != 0:
-                at.face[p, 0] = i
-        slot = edge_slot(side, at.face[p, 0], at.face[p, 1], at.face[p, 2], at.face[p, 3])
-        if at.faces[slot] != 0:
-            good = False
-        at.faces[slot] = b + 1
-    return good

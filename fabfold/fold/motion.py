@@ -24,7 +24,7 @@ class Motion:
     hinges : tuple of str
         Names of the hinges, in the order of the columns of `angles_deg`.
     angles_deg : (k, h) float64 array
-        The keyframes; the first is all zero (A), the last is B.
+        The keyframes in degrees; the first is all zero (A), the last is B.
     moves : tuple of k tuples of int
         Columns that turn on the way to each keyframe; the first is empty.
     certificate : dict
@@ -38,7 +38,13 @@ class Motion:
     certificate: dict[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """The content of ``motion.json`` (format ``fabfold-motion``, version 1)."""
+        """The content of ``motion.json`` (format ``fabfold-motion``, version 1).
+
+        Returns
+        -------
+        dict
+            Keyframes with the names of the hinges, angles in degrees.
+        """
         return {
             "format": "fabfold-motion",
             "version": 1,
@@ -56,6 +62,16 @@ class Motion:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Motion:
         """Inverse of :meth:`to_json`.
+
+        Parameters
+        ----------
+        data : mapping
+            The content of ``motion.json``.
+
+        Returns
+        -------
+        Motion
+            The path and its certificate.
 
         Raises
         ------
@@ -89,6 +105,7 @@ def motion_of(tree: FoldTree, path: NDArray[np.integer]) -> Motion:
     Parameters
     ----------
     tree : FoldTree
+        What folds.
     path : (m, 2) integer array
         Hinge and signed quarter turns about the positive axis, as
         :meth:`fabfold.fold.lattice_foldability.LatticeFoldability.path` gives it.
@@ -124,9 +141,20 @@ def motion_of(tree: FoldTree, path: NDArray[np.integer]) -> Motion:
 
 
 def quarter_path(tree: FoldTree, motion: Motion) -> NDArray[np.int32] | None:
-    """The path as hinges and signed quarter turns about the positive axes, shape (m, 2).
+    """The path as quarter turns.
 
-    None for a path that stops between two states of the lattice.
+    Parameters
+    ----------
+    tree : FoldTree
+        What folds.
+    motion : Motion
+        Its path.
+
+    Returns
+    -------
+    (m, 2) int32 array or None
+        Hinge, and signed quarter turns about its positive axis, one row a move; None for a path
+        that stops between two states of the lattice.
     """
     rows = []
     for k in range(1, len(motion.angles_deg)):
@@ -145,8 +173,14 @@ def end_pose_error(tree: FoldTree, angles_deg: NDArray[np.float64]) -> float:
     Parameters
     ----------
     tree : FoldTree
-    angles_deg : (h,) array
-        Angles at the end of the path.
+        What folds.
+    angles_deg : (h,) float64 array
+        Angles of the hinges at the end of the path, degrees.
+
+    Returns
+    -------
+    float
+        0.0 where every voxel is in its cell, the right way round.
     """
     whole = np.eye(4)
     whole[:3, :3] = tree.root_rotation

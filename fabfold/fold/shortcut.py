@@ -8,80 +8,115 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.fold.mechanism import Mechanism, Scene, clear_scene, pose_scene
-from fabfold.fold.turns import Work, obstacles, workspace
+from fabfold.fold.mechanism import Mechanism
+from fabfold.fold.scene import Scene, clear_scene, pose_scene
+from fabfold.fold.turn_obstacles import TurnBuffers, obstacles, turn_buffers
 from fabfold.lattice.sweep import SweepTable
 
-__all__ = ["cuts_on", "follow", "shorten"]
+__all__ = ["count_clashes", "follow", "shorten"]
 
 
 @njit(cache=True)
-def _met(
+def _count_obstacles(
     mech: Mechanism,
-    at: Scene,
+    scene: Scene,
     table: SweepTable,
     q: NDArray[np.int8],
     step: NDArray[np.int16],
-    work: Work,
+    buffers: TurnBuffers,
 ) -> int:
     """Pairs that hinder a step from state `q`; -1 where the state itself is not valid."""
     count = -1
-    if pose_scene(mech, at, q):
-        count = obstacles(mech, at, table, step[0], step[1], work)
-    clear_scene(mech, at)
+    if pose_scene(mech, scene, q):
+        count = obstacles(mech, scene, table, step[0], step[1], buffers)
+    clear_scene(mech, scene)
     return count
 
 
 @njit(cache=True)
 def follow(
     mech: Mechanism,
-    at: Scene,
+    scene: Scene,
     table: SweepTable,
     q: NDArray[np.int8],
     path: NDArray[np.int16],
 ) -> int:
-    """Make the steps of a path from state `q` (changed on the way) as far as they are free.
+    """Make the steps of a path as far as they are free.
+
+    Parameters
+    ----------
+    mech : Mechanism
+        What folds.
+    scene : Scene
+        Its scene, empty before and after.
+    table : SweepTable
+        Sweeps up to the span of the mechanism: what must be free.
+    q : (h,) int8 array
+        In and out: lattice state before the path, and after the steps made.
+    path : (m, 2) int16 array
+        Hinge of the mechanism and way (+1, -1) of each step.
 
     Returns
     -------
     int
         Steps made: ``len(path)`` when all of them are free.
     """
-    work = workspace(0)
+    buffers = turn_buffers(0)
     for i in range(len(path)):
         k = path[i, 0]
         step = q[k] + path[i, 1]
-        if step < 0 or step > mech.steps[k] or _met(mech, at, table, q, path[i], work) != 0:
+        if (
+            step < 0
+            or step > mech.steps[k]
+            or _count_obstacles(mech, scene, table, q, path[i], buffers) != 0
+        ):
             return i
         q[k] = step
     return len(path)
 
 
 @njit(cache=True)
-def cuts_on(
+def count_clashes(
     mech: Mechanism,
-    at: Scene,
+    scene: Scene,
     whole: SweepTable,
     q: NDArray[np.int8],
     path: NDArray[np.int16],
 ) -> int:
-    """Pairs of a cell and one in its way that whole cells would meet on a path from `q`.
+    """Count the pairs of whole cells that run into each other on a path.
 
-    The path leads through valid states, as one that :func:`follow` made to its end.
+    Parameters
+    ----------
+    mech : Mechanism
+        What folds.
+    scene : Scene
+        Its scene, empty before and after.
+    whole : SweepTable
+        Sweeps of whole cells up to the span of the mechanism.
+    q : (h,) int8 array
+        Lattice state before the path.
+    path : (m, 2) int16 array
+        Hinge of the mechanism and way (+1, -1) of each step; it leads through valid states, as one
+        that :func:`follow` made to its end.
+
+    Returns
+    -------
+    int
+        Pairs, those of every step together.
     """
     now = q.copy()
-    work = workspace(256)
+    buffers = turn_buffers(256)
     total = 0
     for i in range(len(path)):
-        total += _met(mech, at, whole, now, path[i], work)
+        total += _count_obstacles(mech, scene, whole, now, path[i], buffers)
         now[path[i, 0]] += path[i, 1]
     return total
 
 
 @njit(cache=True)
-def _try(
+def _may_replace(
     mech: Mechanism,
-    at: Scene,
+    scene: Scene,
     table: SweepTable,
     whole: SweepTable,
     carved: bool,
@@ -99,18 +134,18 @@ def _try(
     for i in range(low):
         q[path[i, 0]] += path[i, 1]
     start = q.copy()
-    if follow(mech, at, table, q, part) < len(part):
+    if follow(mech, scene, table, q, part) < len(part):
         return False
     if not carved:
         return True
-    old = cuts_on(mech, at, whole, start, path[low : low + size])
-    return cuts_on(mech, at, whole, start, part) <= old
+    old = count_clashes(mech, scene, whole, start, path[low : low + size])
+    return count_clashes(mech, scene, whole, start, part) <= old
 
 
 @njit(cache=True)
-def _drop(
+def _drop_pairs(
     mech: Mechanism,
-    at: Scene,
+    scene: Scene,
     table: SweepTable,
     whole: SweepTable,
     carved: bool,
@@ -124,7 +159,7 @@ def _drop(
             j += 1
         if j < len(path) and path[j, 1] == -path[i, 1]:
             part = path[i + 1 : j].copy()
-            if _try(mech, at, table, whole, carved, path, i, j + 1 - i, part):
+            if _may_replace(mech, scene, table, whole, carved, path, i, j + 1 - i, part):
                 path = np.concatenate((path[:i], part, path[j + 1 :]))
                 i = 0
                 continue
@@ -133,9 +168,9 @@ def _drop(
 
 
 @njit(cache=True)
-def _gather(
+def _gather_turns(
     mech: Mechanism,
-    at: Scene,
+    scene: Scene,
     table: SweepTable,
     whole: SweepTable,
     carved: bool,
@@ -157,11 +192,11 @@ def _gather(
             between = path[i + 1 : j]
             early = np.concatenate((run, path[j : j + 1], between))
             late = np.concatenate((between, run, path[j : j + 1]))
-            if _try(mech, at, table, whole, carved, path, low, len(early), early):
+            if _may_replace(mech, scene, table, whole, carved, path, low, len(early), early):
                 path[low : j + 1] = early
                 changed = True
                 continue
-            if _try(mech, at, table, whole, carved, path, low, len(late), late):
+            if _may_replace(mech, scene, table, whole, carved, path, low, len(late), late):
                 path[low : j + 1] = late
                 changed = True
                 i = low
@@ -173,7 +208,7 @@ def _gather(
 @njit(cache=True)
 def shorten(
     mech: Mechanism,
-    at: Scene,
+    scene: Scene,
     table: SweepTable,
     whole: SweepTable,
     carved: bool,
@@ -183,8 +218,14 @@ def shorten(
 
     Parameters
     ----------
-    table, whole : SweepTable
-        What must stay free, and sweeps of whole cells.
+    mech : Mechanism
+        What folds.
+    scene : Scene
+        Its scene, empty before and after.
+    table : SweepTable
+        Sweeps up to the span of the mechanism: what must stay free.
+    whole : SweepTable
+        Sweeps of whole cells; `table` itself where nothing is carved.
     carved : bool
         `table` has the sweeps of the cells' cores: keep from carving more than before.
     path : (m, 2) int16 array
@@ -193,11 +234,12 @@ def shorten(
     Returns
     -------
     (k, 2) int16 array
+        The shorter path, of the same form.
     """
-    path = _drop(mech, at, table, whole, carved, path.copy())
+    path = _drop_pairs(mech, scene, table, whole, carved, path.copy())
     for _ in range(8):
-        path, changed = _gather(mech, at, table, whole, carved, path)
+        path, changed = _gather_turns(mech, scene, table, whole, carved, path)
         if not changed:
             break
-        path = _drop(mech, at, table, whole, carved, path)
+        path = _drop_pairs(mech, scene, table, whole, carved, path)
     return path

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.fold.barrels import first_encounter
+from fabfold.fold.barrel_collisions import first_barrel_collision
 from fabfold.fold.motion import Motion
 from fabfold.joinery.barrel_sweeps import Sweep, barrel_sweeps
 from fabfold.joinery.bodies import BodyMesh, Joinery
@@ -189,7 +189,7 @@ def _refuse_colliding_barrels(
     tree: FoldTree, motion: Motion, size: HingeSize, voxel_mm: float
 ) -> None:
     """Refuse a path on which two barrels run into each other, before anything is cut."""
-    found = first_encounter(
+    found = first_barrel_collision(
         tree,
         motion,
         inset=(size.reach_mm + size.barrel_radius_mm) / voxel_mm,

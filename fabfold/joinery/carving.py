@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.fold.carving_plan import Carving, plan_carving, skin_of
-from fabfold.fold.clashes import Meeting
+from fabfold.fold.carving_plan import CarvingPlan, plan_carving, skin_of
+from fabfold.fold.clashes import Clash
 from fabfold.fold.motion import Motion, quarter_path
 from fabfold.joinery.booleans import evaluated
 from fabfold.joinery.cells import eroded_cells, occupancy
@@ -144,7 +144,7 @@ def carve(
             f"{names[0]} and {names[1]} run into each other on the folding path, and carving "
             "would cut through a hinge"
         )
-    if not planned.meetings:
+    if not planned.clashes:
         return CarvedMaterial()
     return _CarvingJob(voxels, tree, model, halves, voxel_mm, clearance_mm).run(planned)
 
@@ -170,10 +170,10 @@ class _CarvingJob:
         #: Material of bodies by index, as it is now.
         self._bodies: dict[int, manifold3d.Manifold] = {}
 
-    def run(self, planned: Carving) -> CarvedMaterial:
+    def run(self, planned: CarvingPlan) -> CarvedMaterial:
         """Carve all pairs of cells in the planned order."""
-        for meeting, bounds in zip(planned.meetings, planned.rings, strict=True):
-            self._carve(meeting, float(bounds[0]), float(bounds[1]))
+        for clash, bounds in zip(planned.clashes, planned.rings, strict=True):
+            self._carve(clash, float(bounds[0]), float(bounds[1]))
         self._count()
         return self.carved
 
@@ -214,10 +214,10 @@ class _CarvingJob:
         parts += [evaluated(placed.half ^ box) for placed in self.halves[self._body_of(voxel)]]
         return [part for part in parts if not part.is_empty()]
 
-    def _carve(self, meeting: Meeting, low: float, high: float) -> None:
+    def _carve(self, clash: Clash, low: float, high: float) -> None:
         """Carve one pair: the first cell gives way between two radii, the second elsewhere."""
-        voxels = (meeting.first, meeting.second)
-        frames = [to.copy() for to in (meeting.to_first, meeting.to_second)]
+        voxels = (clash.first, clash.second)
+        frames = [to.copy() for to in (clash.to_first, clash.to_second)]
         for to in frames:
             to[:, 3] *= self.voxel_mm
         corners = [
@@ -227,8 +227,8 @@ class _CarvingJob:
         rings = common_rings(corners[0], corners[1], self._gap_mm / self.voxel_mm)
         rings = rings * self.voxel_mm
         levels = (corners[0][2] + np.arange(_SLABS + 1) / _SLABS) * self.voxel_mm
-        first = PolarSlices(meeting.first, frames[0], rings, levels, ahead=False)
-        second = PolarSlices(meeting.second, frames[1], rings, levels, ahead=True)
+        first = PolarSlices(clash.first, frames[0], rings, levels, ahead=False)
+        second = PolarSlices(clash.second, frames[1], rings, levels, ahead=True)
         # Both are looked at before either is cut.
         edges = [
             slab_edges(self._parts(v), to, levels) for to, v in zip(frames, voxels, strict=True)

@@ -1,8 +1,9 @@
-"""Trees of bounding boxes over the triangles of bodies, fitted anew for every axis of rotation.
+"""Bounding volume hierarchies: trees of boxes over the triangles of bodies.
 
-Everything is in the frame of one hinge: its axis is the z axis. Besides its box each node knows
-the ranges of four quantities that a turn about the axis does not change: ``z``, the distance
-``r`` from the axis, ``(z + r) / √2`` and ``(z - r) / √2``.
+They are built once and fitted anew for every axis of rotation (:func:`refit`). Everything is in the
+frame of one hinge: its axis is the z axis. Besides its box each node knows its *invariants*, the
+ranges of four quantities that a turn about the axis does not change: ``z``, the distance ``r`` from
+the axis, ``(z + r) / √2`` and ``(z - r) / √2``.
 """
 
 # mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
@@ -15,17 +16,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["LEAF", "Boxes", "build", "empty_boxes", "refit"]
+__all__ = ["BoxTrees", "build_tree", "new_box_trees", "refit"]
 
 #: Most triangles in a leaf.
-LEAF = 2
+_LEAF = 2
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 
 
-class Boxes(NamedTuple):
-    """Bounding-box trees of several bodies in one set of arrays.
+class BoxTrees(NamedTuple):
+    """Box trees of several bodies in one set of arrays.
+
+    ``b`` bodies, ``m`` nodes and ``t`` triangles in all; lengths in mm.
 
     Attributes
     ----------
@@ -33,25 +36,25 @@ class Boxes(NamedTuple):
         Nodes ``root[i]`` to ``root[i + 1] - 1`` belong to body ``i``, its root first.
     child : (m, 2) int32 array
         Children of a node, or -1 for a leaf; they come after their parent.
-    part : (m, 2) int32 array
-        First triangle and number of triangles.
+    leaf : (m, 2) int32 array
+        First triangle and number of triangles of a node.
     box : (m, 6) float64 array
-        Smallest x, y, z and largest x, y, z.
-    ring : (m, 8) float64 array
-        Smallest and largest z, r, (z + r) / √2, (z - r) / √2.
+        Smallest x, y, z and largest x, y, z of a node.
+    invariant : (m, 8) float64 array
+        Smallest and largest z, r, (z + r) / √2, (z - r) / √2 of a node.
     triangle : (t, 3, 3) float64 array
-        Corners, in the order of the leaves.
-    own : (t, 8) float64 array
-        `ring` of each triangle.
+        Corners of each triangle, in the order of the leaves.
+    own_invariant : (t, 8) float64 array
+        `invariant` of each triangle.
     """
 
     root: I32
     child: I32
-    part: I32
+    leaf: I32
     box: F64
-    ring: F64
+    invariant: F64
     triangle: F64
-    own: F64
+    own_invariant: F64
 
 
 @njit(cache=True)
@@ -85,19 +88,20 @@ def _split(centre: F64, order: I32, low: int, high: int) -> int:
 
 
 @njit(cache=True)
-def build(triangle: F64) -> tuple[I32, I32, I32]:
-    """Tree over triangles.
+def build_tree(triangle: F64) -> tuple[I32, I32, I32]:
+    """Build the tree of one body, without boxes.
 
     Parameters
     ----------
     triangle : (t, 3, 3) float64 array
+        Corners of the body's triangles.
 
     Returns
     -------
     order : (t,) int32 array
         Triangles in the order of the leaves.
-    child, part : (m, 2) int32 arrays
-        As in :class:`Boxes`, counted from 0.
+    child, leaf : (m, 2) int32 arrays
+        As in :class:`BoxTrees`, counted from 0.
     """
     total = len(triangle)
     order = np.arange(total).astype(np.int32)
@@ -115,7 +119,7 @@ def build(triangle: F64) -> tuple[I32, I32, I32]:
     while at < nodes:
         low = part[at, 0]
         size = part[at, 1]
-        if size > LEAF:
+        if size > _LEAF:
             middle = _split(centre, order, low, low + size)
             child[at, 0] = nodes
             child[at, 1] = nodes + 1
@@ -128,25 +132,25 @@ def build(triangle: F64) -> tuple[I32, I32, I32]:
     return order, child[:nodes].copy(), part[:nodes].copy()
 
 
-def empty_boxes(meshes: list[F64]) -> tuple[Boxes, I32]:
-    """Trees over the triangles of bodies, boxes not yet fitted.
+def new_box_trees(meshes: list[F64]) -> tuple[BoxTrees, I32]:
+    """Build the trees of several bodies, boxes not yet fitted.
 
     Parameters
     ----------
     meshes : list of (t, 3, 3) float64 arrays
-        Triangles of each body.
+        Corners of the triangles of each body.
 
     Returns
     -------
-    boxes : Boxes
-        Triangles in place, in the order of the leaves.
+    boxes : BoxTrees
+        Triangles where they are, in the order of the leaves; to be fitted by :func:`refit`.
     owner : (t,) int32 array
         Body of each triangle.
     """
     roots, children, parts, triangles, owners = [0], [], [], [], []
     nodes = corners = 0
     for body, triangle in enumerate(meshes):
-        order, child, part = build(np.ascontiguousarray(triangle, dtype=np.float64))
+        order, child, part = build_tree(np.ascontiguousarray(triangle, dtype=np.float64))
         child[child >= 0] += nodes
         part[:, 0] += corners
         nodes += len(child)
@@ -156,7 +160,7 @@ def empty_boxes(meshes: list[F64]) -> tuple[Boxes, I32]:
         parts.append(part)
         triangles.append(triangle[order])
         owners.append(np.full(len(triangle), body, dtype=np.int32))
-    boxes = Boxes(
+    boxes = BoxTrees(
         np.array(roots, dtype=np.int32),
         np.concatenate(children),
         np.concatenate(parts),
@@ -193,22 +197,26 @@ def _axis_distance(triangle: F64) -> float:
 
 
 @njit(cache=True)
-def refit(boxes: Boxes, triangle: F64, first: int, last: int) -> None:
-    """Fit the nodes `first` to `last` - 1 (whole bodies) to moved triangles.
+def refit(boxes: BoxTrees, triangle: F64, first: int, last: int) -> None:
+    """Fit the boxes and invariants of some nodes to moved triangles.
 
     Parameters
     ----------
+    boxes : BoxTrees
+        In and out.
     triangle : (t, 3, 3) float64 array
         Corners in the frame of the axis, in the order of the leaves.
+    first, last : int
+        Nodes ``first`` to ``last - 1`` are fitted; they are those of whole bodies.
     """
     half = np.sqrt(0.5)
     for node in range(last - 1, first - 1, -1):
         box = boxes.box[node]
-        ring = boxes.ring[node]
+        invariant = boxes.invariant[node]
         box[:3] = np.inf
         box[3:] = -np.inf
-        ring[0::2] = np.inf
-        ring[1::2] = -np.inf
+        invariant[0::2] = np.inf
+        invariant[1::2] = -np.inf
         if boxes.child[node, 0] >= 0:
             for way in range(2):
                 below = boxes.child[node, way]
@@ -216,14 +224,14 @@ def refit(boxes: Boxes, triangle: F64, first: int, last: int) -> None:
                     box[i] = min(box[i], boxes.box[below, i])
                     box[3 + i] = max(box[3 + i], boxes.box[below, 3 + i])
                 for i in range(0, 8, 2):
-                    ring[i] = min(ring[i], boxes.ring[below, i])
-                    ring[i + 1] = max(ring[i + 1], boxes.ring[below, i + 1])
+                    invariant[i] = min(invariant[i], boxes.invariant[below, i])
+                    invariant[i + 1] = max(invariant[i + 1], boxes.invariant[below, i + 1])
             continue
-        begin = boxes.part[node, 0]
-        for t in range(begin, begin + boxes.part[node, 1]):
+        begin = boxes.leaf[node, 0]
+        for t in range(begin, begin + boxes.leaf[node, 1]):
             corner = triangle[t]
             boxes.triangle[t] = corner
-            own = boxes.own[t]
+            own = boxes.own_invariant[t]
             own[0::2] = np.inf
             own[1::2] = -np.inf
             # r is at least the coordinate along any unit vector e across the axis, so a plane
@@ -250,5 +258,5 @@ def refit(boxes: Boxes, triangle: F64, first: int, last: int) -> None:
                     box[3 + j] = max(box[3 + j], corner[i, j])
             own[2] = _axis_distance(corner)
             for i in range(0, 8, 2):
-                ring[i] = min(ring[i], own[i])
-                ring[i + 1] = max(ring[i + 1], own[i + 1])
+                invariant[i] = min(invariant[i], own[i])
+                invariant[i + 1] = max(invariant[i + 1], own[i + 1])

@@ -1,7 +1,8 @@
-"""Swept proof on the printed bodies: no two of them come closer than a gap, at any angle.
+"""The swept proof: no two printed bodies come closer than a gap, at any angle of the folding path.
 
-Paper section 5 leaves this to a simulator and a person. Here each move of the folding path is
-proven for all angles that it passes through, on the triangles that are printed, hinges included.
+Section 5 of the paper leaves this to a simulator and a person. Here each move of the path is proven
+for all angles that it passes through, on the triangles that are printed, hinges included. The
+bounds are those of :mod:`fabfold.proof.gap`, the trees that make it quick :mod:`fabfold.proof.bvh`.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 from fabfold.errors import CheckError
 from fabfold.fold.motion import Motion, end_pose_error
 from fabfold.progress import Progress, SilentProgress
-from fabfold.proof.bvh import Boxes, empty_boxes, refit
-from fabfold.proof.gap import FAILED, UNPROVEN, least_gap, sweep_pairs
+from fabfold.proof.bvh import BoxTrees, new_box_trees, refit
+from fabfold.proof.gap import FAILED, UNPROVEN, prove_gap, prove_pairs
 from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["certify"]
@@ -51,10 +52,26 @@ def _frame(point: F64, direction: F64) -> F64:
 
 @dataclass
 class _Bodies:
-    """All bodies' triangles in shape A, in mm, and the boxes over them."""
+    """All bodies' triangles in shape A, and the boxes over them.
+
+    Attributes
+    ----------
+    names : tuple of b str
+        Names of the bodies.
+    boxes : BoxTrees
+        Trees over the triangles, fitted to where they were last placed.
+    triangle : (t, 3, 3) float64 array
+        Corners in mm in shape A, in the order of the leaves.
+    owner : (t,) int32 array
+        Body of each triangle.
+    voxel_mm : float
+        Side of a voxel in mm.
+    origin_mm : (3,) float64 array
+        Where the lattice's origin is in mm in shape A.
+    """
 
     names: tuple[str, ...]
-    boxes: Boxes
+    boxes: BoxTrees
     triangle: F64
     owner: I32
     voxel_mm: float
@@ -88,7 +105,7 @@ def _load(
         if len(corners) == 0 or not np.isfinite(corners).all():
             raise CheckError(f"{body.name}: its mesh is empty or has corners that are no numbers")
         triangles.append(corners)
-    boxes, owner = empty_boxes(triangles)
+    boxes, owner = new_box_trees(triangles)
     names = tuple(body.name for body in tree.bodies)
     return _Bodies(
         names, boxes, boxes.triangle.copy(), owner, float(voxel_mm), np.array(origin_mm, float)
@@ -151,7 +168,7 @@ def _refuse(
     if verdict == FAILED:
         # The proof stops at the first distance that is too small: say the smallest at that angle.
         least = np.array([result[0], np.inf, 0.0])
-        least_gap(bodies.boxes, pair[0], pair[1], result[2], result[2], -1.0, 1e-9, least)
+        prove_gap(bodies.boxes, pair[0], pair[1], result[2], result[2], -1.0, 1e-9, least)
         told = "run into each other" if least[0] <= 0 else f"come within {max(least[0], 0):.4f} mm"
         raise CheckError(
             f"{where}: {a} and {b} {told}{angle}, less than the {asked:g} mm "
@@ -190,20 +207,22 @@ def certify(
     Parameters
     ----------
     tree : FoldTree
+        What folds.
     motion : Motion
-        One hinge a move.
+        Its path, one hinge a move.
     meshes : sequence of (vertices, faces)
         Closed triangle meshes of ``tree.bodies``, in their order: (v, 3) float64 in mm, shape A,
         and (f, 3) int32.
     voxel_mm : float
-        Side of a voxel.
+        Side of a voxel in mm.
     origin_mm : (3,) sequence of float
         ``origin_mm + voxel_mm * lattice`` is mm in shape A.
     min_gap_mm : float
-        The gap that must be proven, > 0.
+        The gap that must be proven, mm, above 0.
     progress : Progress, optional
+        Hears of every move.
     slack_mm : float
-        How far the certified figures may stay below the smallest distance really met.
+        How far the certified figures may stay below the smallest distance really met, mm.
 
     Returns
     -------
@@ -235,7 +254,7 @@ def certify(
     bodies.place(bodies.in_mm(poses))
     pair = np.zeros(2, dtype=np.int32)
     result = np.array([ceiling, np.inf, 0.0])
-    verdict = sweep_pairs(bodies.boxes, everyone, everyone, 0.0, 0.0, wanted, 1e-6, result, pair)
+    verdict = prove_pairs(bodies.boxes, everyone, everyone, 0.0, 0.0, wanted, 1e-6, result, pair)
     _refuse(verdict, _START, bodies, pair, result, min_gap_mm)
     _check_nesting(bodies.names, meshes)
     seen = float(result[0])
@@ -312,7 +331,7 @@ def _move(
     parts = max(1, math.ceil(abs(turn_deg) / 90.0 - 1e-9))
     for part in range(parts):
         ends = sorted(math.radians(turn_deg) * share / parts for share in (part, part + 1))
-        verdict = sweep_pairs(
+        verdict = prove_pairs(
             bodies.boxes, turning, resting, ends[0], ends[1], wanted, slack, result, pair
         )
         _refuse(verdict, where, bodies, pair, result, asked)

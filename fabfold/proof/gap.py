@@ -1,7 +1,8 @@
-"""Proof that triangles keep a gap while one set of them turns about the z axis.
+"""Lower bounds of the gap between triangles while one set of them turns about the z axis.
 
-For a pair of pieces (boxes or triangles) and a range of angles, a *lower bound* of their distance
-over all angles in the range comes from any of these, whichever is best:
+This is the arithmetic of the swept proof (:mod:`fabfold.proof.certify`). For a pair of pieces
+(boxes or triangles) and a range of angles, a *lower bound* of their distance over all angles in
+the range comes from any of these, whichever is best:
 
 * quantities that the turn does not change: z, r, (z + r) / √2, (z - r) / √2, or, for a pair of
   triangles, the combination of z and r that the nearest points suggest;
@@ -22,14 +23,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.proof.bvh import Boxes
+from fabfold.proof.bvh import BoxTrees
 
-__all__ = ["DONE", "FAILED", "UNPROVEN", "least_gap", "sweep_pairs", "triangle_distance"]
+__all__ = ["DONE", "FAILED", "UNPROVEN", "prove_gap", "prove_pairs", "triangle_distance"]
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 
-#: Verdicts of :func:`least_gap`.
+#: Verdicts of :func:`prove_gap`.
 DONE, FAILED, UNPROVEN = 0, 1, 2
 #: Ranges of angles (radians) are not divided below this.
 FINEST = 1e-6
@@ -75,6 +76,7 @@ def _segments(p: F64, u: F64, q: F64, v: F64, out: F64) -> float:
 
 @njit(cache=True)
 def _cross(a: F64, b: F64, out: F64) -> None:
+    """Cross product; `out` gets it."""
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
@@ -133,14 +135,19 @@ def _corner_to_face(
 
 @njit(cache=True)
 def triangle_distance(one: F64, two: F64, nearest: F64) -> float:
-    """Distance of two triangles; 0 where they meet.
+    """Distance of two triangles.
 
     Parameters
     ----------
     one, two : (3, 3) float64 arrays
-        Corners.
+        Corners, mm.
     nearest : (2, 3) float64 array
-        Gets a nearest point on each.
+        Out: a nearest point on each.
+
+    Returns
+    -------
+    float
+        Distance in mm; 0 where they meet.
     """
     edge_one = np.empty((3, 3))
     edge_two = np.empty((3, 3))
@@ -217,7 +224,7 @@ def _profile(outer: F64, inner: F64, a: float, b: float) -> float:
 
 
 @njit(cache=True)
-def _ring_gap(one: F64, two: F64) -> float:
+def _invariant_gap(one: F64, two: F64) -> float:
     """Best separation by a quantity that the turn does not change."""
     best = -np.inf
     for i in range(0, 8, 2):
@@ -264,6 +271,7 @@ def _swept_box_gap(moving: F64, still: F64, c0: float, s0: float, c1: float, s1:
 
 @njit(cache=True)
 def _turned(triangle: F64, cosine: float, sine: float, out: F64) -> None:
+    """Triangle turned about the z axis; `out` gets it."""
     for k in range(3):
         x = triangle[k, 0]
         y = triangle[k, 1]
@@ -274,13 +282,13 @@ def _turned(triangle: F64, cosine: float, sine: float, out: F64) -> None:
 
 @njit(cache=True)
 def _triangles(  # noqa: PLR0915 - one proof, its cases in order of cost
-    boxes: Boxes, t: int, s: int, low: float, high: float, wanted: float, slack: float,
+    boxes: BoxTrees, t: int, s: int, low: float, high: float, wanted: float, slack: float,
     result: F64,
 ) -> int:  # fmt: skip
-    """Prove the gap of two triangles over a range of angles; see :func:`least_gap`."""
+    """Prove the gap of two triangles over a range of angles; see :func:`prove_gap`."""
     moving = boxes.triangle[t]
     still = boxes.triangle[s]
-    bound = _ring_gap(boxes.own[t], boxes.own[s])
+    bound = _invariant_gap(boxes.own_invariant[t], boxes.own_invariant[s])
     goal = max(wanted, result[0] - slack)
     if bound >= goal:
         result[1] = min(result[1], bound)
@@ -351,27 +359,28 @@ def _triangles(  # noqa: PLR0915 - one proof, its cases in order of cost
 
 
 @njit(cache=True)
-def least_gap(  # noqa: PLR0915 - one traversal
-    boxes: Boxes, moving: int, still: int, low: float, high: float, wanted: float, slack: float,
+def prove_gap(  # noqa: PLR0915 - one traversal
+    boxes: BoxTrees, moving: int, still: int, low: float, high: float, wanted: float, slack: float,
     result: F64,
 ) -> int:  # fmt: skip
     """Prove that a turning body keeps a gap from a still one.
 
     Parameters
     ----------
-    boxes : Boxes
+    boxes : BoxTrees
         Fitted in the frame of the axis.
     moving, still : int
-        Bodies.
+        Numbers of the two bodies in `boxes`.
     low, high : float
         Range of angles in radians, at most half a turn; equal to look at one pose only.
     wanted : float
-        The gap to be proven.
+        The gap to be proven, mm.
     slack : float
-        How far the proven bound may stay below the smallest distance seen; the larger, the
+        How far the proven bound may stay below the smallest distance seen, mm; the larger, the
         quicker.
     result : (3,) float64 array
-        In and out: smallest distance seen, least bound proven, angle of the last news.
+        In and out: smallest distance seen and least bound proven, mm; angle of that distance, or
+        where the proof ended, radians.
 
     Returns
     -------
@@ -394,7 +403,7 @@ def least_gap(  # noqa: PLR0915 - one traversal
         begin = span[depth, 0]
         end = span[depth, 1]
         goal = max(wanted, result[0] - slack)
-        bound = _ring_gap(boxes.ring[a], boxes.ring[b])
+        bound = _invariant_gap(boxes.invariant[a], boxes.invariant[b])
         if bound < goal:
             c0 = np.cos(begin)
             s0 = np.sin(begin)
@@ -409,8 +418,8 @@ def least_gap(  # noqa: PLR0915 - one traversal
         leaf_a = boxes.child[a, 0] < 0
         leaf_b = boxes.child[b, 0] < 0
         if leaf_a and leaf_b:
-            for t in range(boxes.part[a, 0], boxes.part[a, 0] + boxes.part[a, 1]):
-                for s in range(boxes.part[b, 0], boxes.part[b, 0] + boxes.part[b, 1]):
+            for t in range(boxes.leaf[a, 0], boxes.leaf[a, 0] + boxes.leaf[a, 1]):
+                for s in range(boxes.leaf[b, 0], boxes.leaf[b, 0] + boxes.leaf[b, 1]):
                     verdict = _triangles(boxes, t, s, begin, end, wanted, slack, result)
                     if verdict != DONE:
                         return verdict
@@ -429,7 +438,7 @@ def least_gap(  # noqa: PLR0915 - one traversal
             size_a = max(size_a, boxes.box[a, 3 + i] - boxes.box[a, i])
             size_b = max(size_b, boxes.box[b, 3 + i] - boxes.box[b, i])
         # Turn or shape: divide what smears the pair more.
-        lever = min(boxes.ring[a, 3], boxes.ring[b, 3])
+        lever = min(boxes.invariant[a, 3], boxes.invariant[b, 3])
         if lever * (end - begin) > 2.0 * max(size_a, size_b):
             middle = 0.5 * (begin + end)
             for way in range(2):
@@ -450,25 +459,34 @@ def least_gap(  # noqa: PLR0915 - one traversal
 
 
 @njit(cache=True)
-def sweep_pairs(
-    boxes: Boxes, moving: I32, still: I32, low: float, high: float, wanted: float, slack: float,
+def prove_pairs(
+    boxes: BoxTrees, moving: I32, still: I32, low: float, high: float, wanted: float, slack: float,
     result: F64, pair: I32,
 ) -> int:  # fmt: skip
-    """:func:`least_gap` of every turning with every still body.
+    """Prove that every turning body keeps a gap from every still one.
 
     Parameters
     ----------
+    boxes : BoxTrees
+        Fitted in the frame of the axis.
     moving, still : (m,), (s,) int32 arrays
         Bodies; a body in both is not paired with itself or twice with another.
+    low, high, wanted, slack, result
+        As for :func:`prove_gap`, for all pairs together.
     pair : (2,) int32 array
-        Gets the two bodies with the smallest distance seen, or those where the proof failed.
+        Out: the two bodies with the smallest distance seen, or those where the proof failed.
+
+    Returns
+    -------
+    int
+        DONE, or the verdict of the pair where the proof ended.
     """
     for a in moving:
         for b in still:
             if a == b or (low == high and a > b):
                 continue
             seen = result[0]
-            verdict = least_gap(boxes, a, b, low, high, wanted, slack, result)
+            verdict = prove_gap(boxes, a, b, low, high, wanted, slack, result)
             if verdict != DONE or result[0] < seen:
                 pair[0] = a
                 pair[1] = b

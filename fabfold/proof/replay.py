@@ -1,8 +1,10 @@
-"""The folding path played in a physics simulator (MuJoCo), as a maker's hands would do it.
+"""The folding path rehearsed in a physics simulator (MuJoCo), as a maker's hands would fold.
 
-This is a second opinion, not a proof: motors turn the hinges along the certified path, contacts
-push back, and the report says how far bodies were pressed into each other and how far the hinges
-lagged behind. The proof is :mod:`fabfold.proof.certify`.
+Motors turn the hinges along the path, contacts push back, and the report says how far bodies were
+pressed into each other and how far the hinges lagged behind. This is a rehearsal, not a proof, and
+not independent of it: each body is a set of boxes, the boxes of neighbouring cells are as far apart
+as the certificate says, and which cells are only seen by their cores comes from the planner. The
+proof is :mod:`fabfold.proof.certify`, the independent opinion :mod:`fabfold.proof.sampled`.
 """
 
 from __future__ import annotations
@@ -15,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import CheckError
-from fabfold.fold.clashes import meetings_on
-from fabfold.fold.cores import CORE
+from fabfold.fold.clashes import clashes_on
+from fabfold.fold.core_sweep import CORE_HALF_SIDE
 from fabfold.fold.motion import Motion, end_pose_error, quarter_path
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.fold_tree import FoldTree
@@ -44,13 +46,13 @@ class ReplayReport:
     Attributes
     ----------
     max_penetration_mm : float
-        Deepest that two boxes were pressed into each other.
+        Deepest that two boxes were pressed into each other, mm.
     max_angle_error_deg : float
-        Furthest that any hinge was from where it should be at the end of any move.
+        Furthest that any hinge was from where it should be at the end of any move, degrees.
     max_lag_deg : float
-        The same at any instant.
+        The same at any instant, degrees.
     end_pose_error_mm : float
-        Furthest that any voxel's corner was from its place in the template at the end.
+        Furthest that any voxel's corner was from its place in the template at the end, mm.
     contact_steps : int
         Time steps in which anything touched.
     steps : int
@@ -68,7 +70,13 @@ class ReplayReport:
     geometry: str
 
     def to_json(self) -> dict[str, Any]:
-        """JSON-ready copy."""
+        """The report as plain values.
+
+        Returns
+        -------
+        dict
+            One entry for each attribute.
+        """
         return asdict(self)
 
 
@@ -78,21 +86,21 @@ def material_boxes(
     voxel_mm: float,
     origin_mm: Sequence[float],
     gap_mm: float,
-    interlocked: Collection[int] = (),
+    carved: Collection[int] = (),
 ) -> list[tuple[int, F64, F64]]:
     """Boxes about the material that each body has in each of its cells.
+
+    Of a voxel that shares its cell in B there is a box about the material in each eighth.
 
     Parameters
     ----------
     tree, meshes, voxel_mm, origin_mm
         As for :func:`fabfold.proof.certify.certify`.
     gap_mm : float
-        Boxes of neighbouring cells end this far apart.
-    interlocked : collection of int
+        Boxes of neighbouring cells end this far apart, mm.
+    carved : collection of int
         Voxels that were carved so that they pass each other: a box cannot follow a round, so the
         box is about what lies in the core of the cell.
-
-    Of a voxel that shares its cell in B there is a box about the material in each eighth.
 
     Returns
     -------
@@ -116,7 +124,7 @@ def material_boxes(
             )
         )
         for voxel in body.voxels:
-            reach = CORE if voxel in interlocked else half
+            reach = CORE_HALF_SIDE if voxel in carved else half
             for middle, most in _parts(tree, voxel, reach):
                 piece = solid
                 for axis in range(3):
@@ -215,12 +223,16 @@ def _model(tree: FoldTree, boxes: list[tuple[int, F64, F64]]) -> mujoco.MjModel:
     return spec.compile()
 
 
-def _interlocked(tree: FoldTree, motion: Motion) -> set[int]:
-    """Voxels that run into others as whole cells, on a path from state to state of the lattice."""
+def _carved_voxels(tree: FoldTree, motion: Motion) -> set[int]:
+    """Voxels that clash as whole cells, on a path from state to state of the lattice."""
     path = quarter_path(tree, motion)
     if path is None or tree.octants is not None:
         return set()
-    return {v for m in meetings_on(hinge_system(tree), path) for v in (m.first, m.second)}
+    return {
+        voxel
+        for clash in clashes_on(hinge_system(tree), path)
+        for voxel in (clash.first, clash.second)
+    }
 
 
 def replay(
@@ -246,16 +258,17 @@ def replay(
     tree, motion, meshes, voxel_mm, origin_mm
         As for :func:`fabfold.proof.certify.certify`.
     progress : Progress, optional
+        Hears of every move.
     gap_mm : float, optional
-        Gap between the boxes of neighbouring cells; the certified gap of `motion` if it has one,
-        else 1.5 % of a voxel.
+        Gap between the boxes of neighbouring cells, mm; the certified gap of `motion` if it has
+        one, else 1.5 % of a voxel.
     seconds_per_quarter : float
-        Simulated time for 90°.
+        Simulated time for 90°, seconds.
 
     Returns
     -------
     ReplayReport
-        The same for the same arguments.
+        What was seen; the same for the same arguments.
 
     Raises
     ------
@@ -267,8 +280,8 @@ def replay(
     told = progress or SilentProgress()
     if gap_mm is None:
         gap_mm = float(motion.certificate.get("min_gap_mm", 0.015 * voxel_mm))
-    interlocked = _interlocked(tree, motion)
-    boxes = material_boxes(tree, meshes, voxel_mm, origin_mm, gap_mm, interlocked)
+    carved = _carved_voxels(tree, motion)
+    boxes = material_boxes(tree, meshes, voxel_mm, origin_mm, gap_mm, carved)
     model = _model(tree, boxes)
     data = mujoco.MjData(model)
     # The compiler numbers bodies depth first: ask for places by name.
@@ -306,7 +319,7 @@ def replay(
     angles = np.degrees(data.qpos[joint])
     told.update(1.0, f"deepest contact {deepest * voxel_mm:.3f} mm")
     links = sum(body.edge is not None for body in tree.bodies)
-    cores = f", {len(interlocked)} carved cells by their cores" if interlocked else ""
+    cores = f", {len(carved)} carved cells by their cores" if carved else ""
     sheets = f", {links} link plates as sheets between them" if links else ""
     return ReplayReport(
         max_penetration_mm=round(deepest * voxel_mm, 4),

@@ -1,7 +1,7 @@
-"""A second opinion on the folding path: the printed bodies, posed degree by degree.
+"""A second opinion on the folding path by other libraries: the printed bodies at every degree.
 
-The proof of :mod:`fabfold.proof.certify` covers every angle by means of our own. This check takes
-nothing from it: forward kinematics of its own from the content of ``tree.json`` and
+The proof of :mod:`fabfold.proof.certify` covers every angle, by code of this project. This check
+shares no code with it: forward kinematics of its own from the content of ``tree.json`` and
 ``motion.json``, collision and distance by FCL, volumes by manifold3d. It proves nothing between its
 samples, but a fault that both have is hard to imagine.
 """
@@ -31,18 +31,20 @@ class SampledPath:
 
     Attributes
     ----------
-    step_deg, gap_step_deg : float
-        Degrees between two poses at which collisions were looked for, and distance measured.
+    step_deg : float
+        Degrees between two poses at which collisions were looked for.
+    gap_step_deg : float
+        Degrees between two poses at which the distance was measured.
     poses : int
-        Poses looked at.
+        Number of poses looked at.
     least_mm : float
-        Smallest distance of two bodies measured; 0.0 where some collide.
+        Smallest distance of two bodies measured, mm; 0.0 where some collide.
     where : str
         Where that was: move, angle and bodies.
     hits : tuple of str
         The first collision of every move that has one: move, angle and bodies.
     overlap_mm3 : float
-        Volume that bodies share in shape A and in shape B; finds a body inside another.
+        Volume that bodies share in shape A and in shape B, mm³; finds a body inside another.
     """
 
     step_deg: float
@@ -114,6 +116,7 @@ class _Linkage:
 
 
 def _placed(mesh: Mesh, pose: F64) -> F64:
+    """Corners of a mesh moved by a transform, mm."""
     return np.asarray(mesh[0], dtype=float) @ pose[:3, :3].T + pose[:3, 3]
 
 
@@ -135,6 +138,7 @@ class _Group:
         self.thing = fcl.CollisionObject(model)
 
     def turn(self, pose: F64) -> None:
+        """Move the bodies by a transform, from where they were put at first."""
         import fcl
 
         self.thing.setTransform(fcl.Transform(pose[:3, :3], pose[:3, 3]))
@@ -182,7 +186,7 @@ def _overlap(meshes: Mapping[str, Mesh], poses: Poses) -> float:
     return max(0.0, float(sum(solid.volume() for solid in solids) - whole.volume()))
 
 
-class _Watch:
+class _Sightings:
     """What was seen so far."""
 
     def __init__(self) -> None:
@@ -213,7 +217,7 @@ def _boxes_apart(one: F64, two: F64) -> float:
     return float(np.linalg.norm(np.maximum(low - high, 0.0)))
 
 
-def _see_start(watch: _Watch, meshes: Mapping[str, Mesh], poses: Poses) -> None:
+def _see_start(watch: _Sightings, meshes: Mapping[str, Mesh], poses: Poses) -> None:
     """All pairs in shape A, save those whose boxes are farther apart than the least so far."""
     groups = {name: _Group([name], meshes, poses) for name in meshes}
     points = {name: _placed(meshes[name], poses[name]) for name in meshes}
@@ -245,17 +249,19 @@ def sample_path(
         The content of ``tree.json`` and ``motion.json``; one hinge turns in a move.
     meshes : mapping of str to (vertices, faces)
         Closed mesh of every body by name, link plates of double hinges included: (v, 3) in mm in
-        shape A, (f, 3).
+        shape A, (f, 3) corners of the triangles.
     step_deg : float
         Most degrees between two poses that are searched for collisions.
     gap_step_deg : float, optional
         The same for the distance, which takes FCL some twenty times as long; default `step_deg`.
         It is measured at both ends of every move in any case.
     progress : Progress, optional
+        Hears of every move.
 
     Returns
     -------
     SampledPath
+        What was seen: collisions, the smallest distance, shared volume.
 
     Raises
     ------
@@ -276,7 +282,7 @@ def sample_path(
     def poses_at(angles: F64) -> Poses:
         return linkage.poses(dict(zip(hinges, angles.tolist(), strict=True)))
 
-    watch = _Watch()
+    watch = _Sightings()
     told.update(0.0, "looking at shape A")
     _see_start(watch, meshes, poses_at(frames[0]))
     overlap = _overlap(meshes, poses_at(frames[0])) + _overlap(meshes, poses_at(frames[-1]))
@@ -304,7 +310,7 @@ def sample_path(
 
 
 def _see_move(
-    watch: _Watch,
+    watch: _Sightings,
     linkage: _Linkage,
     meshes: Mapping[str, Mesh],
     poses: Poses,

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from fabfold.errors import NoFoldError, NoTreeError, RecipeError
-from fabfold.fold.closing import closed
-from fabfold.fold.cores import CORE
+from fabfold.fold.core_sweep import CORE_HALF_SIDE
+from fabfold.fold.crease_hinges import add_crease_hinges
 from fabfold.fold.lattice_foldability import LatticeFoldability
 from fabfold.lattice.template import Template
 from fabfold.progress import Progress
@@ -338,7 +338,7 @@ class Rounds:
             self._jobs[option] = self._job_of(seed)
         job = self._jobs[option]
         if isinstance(job, Job) and self._carves((seed - self._seeds(0)[0]) // SEEDS_PER_ROUND):
-            judge = LatticeFoldability(carve=CORE, material=self.voxels(seed).subvoxels)
+            judge = LatticeFoldability(carve=CORE_HALF_SIDE, material=self.voxels(seed).subvoxels)
             return replace(job, foldability=judge)
         return job
 
@@ -398,5 +398,5 @@ class Rounds:
 
     def closed(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Those that can be folded along the template's creases too, where it has any."""
-        folded = (closed(candidate, self.template) for candidate in candidates)
+        folded = (add_crease_hinges(candidate, self.template) for candidate in candidates)
         return [candidate for candidate in folded if candidate is not None]

@@ -74,8 +74,8 @@ def restrict_to_parts(problem: TreeProblem, seed: int, depth: NDArray[np.float64
     Returns
     -------
     TreeProblem
-        Its trees fold into the template as it lies flat; :func:`fabfold.fold.closing.closed` adds
-        the folds along the creases.
+        Its trees fold into the template as it lies flat;
+        :func:`fabfold.fold.crease_hinges.add_crease_hinges` adds the folds along the creases.
 
     Raises
     ------

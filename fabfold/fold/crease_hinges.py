@@ -1,4 +1,8 @@
-"""From a tree that fills a template with creases to the tree that ends in the folded shape."""
+"""Hinges on the creases of a template: from a tree that fills it flat to one that ends folded.
+
+A template with creases is filled as it lies flat (:mod:`fabfold.lattice.creases`). Each crease then
+becomes a hinge of the tree, and its turn is the last of the folding path.
+"""
 
 from __future__ import annotations
 
@@ -8,20 +12,33 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.fold.lattice_paths import free_moves
+from fabfold.fold.lattice_planner import count_free_moves
 from fabfold.lattice.creases import Parts, folded_template, line_of, parts_of, rim_of
 from fabfold.lattice.template import Template
 from fabfold.tree.candidate import Candidate
 from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
 from fabfold.tree.system import hinge_system
 
-__all__ = ["closed"]
+__all__ = ["add_crease_hinges"]
 
 
-class _Turn(NamedTuple):
+class _HingeEnds(NamedTuple):
     """A hinge before it is numbered.
 
-    ``near`` and ``far`` are nodes: groups of voxels, and after them the link plates.
+    Attributes
+    ----------
+    edge : int
+        Edge of the tree that it belongs to.
+    hinge : int
+        Hinge of the tree that it is, or ``-1 - part`` for the crease that carries a part.
+    near, far : int
+        Nodes that it joins: groups of voxels, and after them the link plates.
+    point : (float, float, float)
+        Middle of its lattice edge in A, lattice units.
+    direction : (int, int, int)
+        Axis, a positive unit vector.
+    angle_deg : float
+        Angle in B of the far node against the near one.
     """
 
     edge: int
@@ -33,14 +50,15 @@ class _Turn(NamedTuple):
     angle_deg: float
 
 
-def closed(candidate: Candidate, template: Template) -> Candidate | None:
-    """A candidate for a template with creases, folded along them in the end.
+def add_crease_hinges(candidate: Candidate, template: Template) -> Candidate | None:
+    """Let a candidate fold along the creases of its template in the end.
 
     Parameters
     ----------
     candidate : Candidate
         Its tree fills `template` as it lies flat.
     template : Template
+        With the creases.
 
     Returns
     -------
@@ -65,7 +83,7 @@ def closed(candidate: Candidate, template: Template) -> Candidate | None:
     ]
     final, order, sign = _rebuilt(tree, template, parts, place, groups, turns)
     path = _path(template, parts, candidate.path, final, turns, order, sign)
-    if free_moves(hinge_system(final), path) < len(path):
+    if count_free_moves(hinge_system(final), path) < len(path):
         return None
     return replace(candidate, tree=final, path=path)
 
@@ -113,7 +131,9 @@ def _groups(tree: FoldTree, opened: set[int]) -> tuple[list[list[int]], NDArray[
     return groups, node
 
 
-def _old_hinges(tree: FoldTree, groups: list[list[int]], node: NDArray[np.int64]) -> list[_Turn]:
+def _old_hinges(
+    tree: FoldTree, groups: list[list[int]], node: NDArray[np.int64]
+) -> list[_HingeEnds]:
     """The hinges that the tree has already, between the nodes of the new one."""
     plates = [b for b, body in enumerate(tree.bodies) if body.edge is not None]
     plate = {b: len(groups) + k for k, b in enumerate(plates)}
@@ -130,7 +150,9 @@ def _old_hinges(tree: FoldTree, groups: list[list[int]], node: NDArray[np.int64]
                     voxel = edge.parent if owner[edge.parent] == body else edge.child
                     ends.append(int(node[voxel]))
             turns.append(
-                _Turn(number, h, ends[0], ends[1], hinge.point, hinge.direction, hinge.angle_deg)
+                _HingeEnds(
+                    number, h, ends[0], ends[1], hinge.point, hinge.direction, hinge.angle_deg
+                )
             )
     return turns
 
@@ -143,7 +165,7 @@ def _crease_hinge(
     node: NDArray[np.int64],
     part: int,
     edge: int,
-) -> _Turn:
+) -> _HingeEnds:
     """The hinge of a crease in shape A."""
     crease = template.creases[parts.crease[part]]
     on_line, along = line_of(crease)
@@ -156,7 +178,7 @@ def _crease_hinge(
     axis = np.rint(back @ along).astype(int)
     i, j, k = np.abs(axis).tolist()
     angle = float(axis.sum() * crease.angle_deg)
-    return _Turn(edge, -1 - part, int(node[u]), int(node[v]), (x, y, z), (i, j, k), angle)
+    return _HingeEnds(edge, -1 - part, int(node[u]), int(node[v]), (x, y, z), (i, j, k), angle)
 
 
 def _rebuilt(
@@ -165,7 +187,7 @@ def _rebuilt(
     parts: Parts,
     place: NDArray[np.int64],
     groups: list[list[int]],
-    turns: list[_Turn],
+    turns: list[_HingeEnds],
 ) -> tuple[FoldTree, list[int], list[int]]:
     """The tree with all `turns` as hinges; the turn of each hinge, and its sign."""
     # The largest piece of the old root stays the root, so that only creases may change ends.
@@ -231,6 +253,7 @@ def _rebuilt(
 
 
 def _members(groups: list[list[int]], node: int) -> list[int]:
+    """Voxels of a node; a link plate has none."""
     return groups[node] if node < len(groups) else []
 
 
@@ -239,7 +262,7 @@ def _path(
     parts: Parts,
     path: NDArray[np.int32],
     final: FoldTree,
-    turns: list[_Turn],
+    turns: list[_HingeEnds],
     order: list[int],
     sign: list[int],
 ) -> NDArray[np.int32]:

@@ -1,27 +1,31 @@
-"""The plain meaning of the lattice kernels, in NumPy, by another way.
+"""The oracle of the lattice kernels: the plain meaning of every question, by another way.
 
-Nothing here shares code with the kernels: poses are 4 by 4 matrices, the root body stays still,
-and a turn is looked at every degree with separating axes instead of a table. It is slow, it is
-what the kernels are tested against, and it says independently whether a path is free.
+It runs no line of fabfold, so it shares no fault with it: poses are 4 by 4 matrices made by SciPy,
+the root body stays still, a turn is looked at every degree with separating axes instead of a table,
+and the sizes of barrels and link plates are written down here once more. It is slow.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from fabfold.fold.barrels import segment_distance
-from fabfold.lattice.plate_sweep import BARREL_HALF, PLATE_CORE, PLATE_HALF, PLATE_LEAST, POST_LEAST
-from fabfold.lattice.rotations import rotation_about
-from fabfold.lattice.segments import INSET, LEAST
-from fabfold.tree.system import HingeSystem
+if TYPE_CHECKING:
+    from fabfold.tree.system import HingeSystem
 
 __all__ = [
+    "BARREL_INSET",
+    "BARREL_LEAST",
+    "TOUCH",
     "barrel_meetings",
     "path_overlap",
     "plate_meetings",
     "plates",
     "poses",
+    "segment_distance",
     "state_is_valid",
     "stuck",
     "subtree",
@@ -30,31 +34,75 @@ __all__ = [
 
 #: Overlaps below this, in voxel sides, are faces that touch.
 TOUCH = 1e-9
+#: What the least distances give way for rounding, in voxel sides.
+ROUNDING = 1e-3
+#: The definition, in voxel sides (20 mm): a barrel has a radius of 2.5 mm and ends 2.8 mm from the
+#: end of its lattice edge, a plate is 2 mm thick, and parts keep 0.3 mm from each other.
+BARREL_INSET = (2.8 + 2.5) / 20
+BARREL_LEAST = (2 * 2.5 + 0.3) / 20
+PLATE_THICK, PLATE_ROOM = 0.1, 0.14
+PLATE_LEAST = PLATE_THICK + 0.015
+
+
+def turn_about(
+    point: NDArray[np.float64], direction: NDArray[np.float64], degrees: float
+) -> NDArray[np.float64]:
+    """Rigid transform (4, 4) that turns space about a line."""
+    out = np.eye(4)
+    out[:3, :3] = Rotation.from_rotvec(
+        np.asarray(direction, float) * degrees, degrees=True
+    ).as_matrix()
+    out[:3, 3] = np.asarray(point, float) - out[:3, :3] @ point
+    return out
+
+
+def segment_distance(one: NDArray[np.float64], two: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of pairs of segments, each (..., 2, 3) end points.
+
+    Two segments are nearest at an end of one of them, or where the line across both meets both.
+    """
+    best = np.minimum(
+        np.minimum(_to_segment(one[..., 0, :], two), _to_segment(one[..., 1, :], two)),
+        np.minimum(_to_segment(two[..., 0, :], one), _to_segment(two[..., 1, :], one)),
+    )
+    u, v = one[..., 1, :] - one[..., 0, :], two[..., 1, :] - two[..., 0, :]
+    across = np.cross(u, v)
+    square = (across**2).sum(-1)
+    slanted = square > 1e-12
+    square = np.where(slanted, square, 1.0)
+    away = two[..., 0, :] - one[..., 0, :]
+    s = (np.cross(away, v) * across).sum(-1) / square
+    t = (np.cross(away, u) * across).sum(-1) / square
+    inside = slanted & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
+    lines = np.abs((away * across).sum(-1)) / np.sqrt(square)
+    return np.where(inside, np.minimum(best, lines), best)
+
+
+def _to_segment(point: NDArray[np.float64], segment: NDArray[np.float64]) -> NDArray[np.float64]:
+    along = segment[..., 1, :] - segment[..., 0, :]
+    away = point - segment[..., 0, :]
+    share = np.clip((away * along).sum(-1) / (along * along).sum(-1), 0, 1)
+    return np.linalg.norm(away - share[..., None] * along, axis=-1)
 
 
 def subtree(system: HingeSystem, hinge: int) -> NDArray[np.bool_]:
     """Bodies that a hinge carries, shape (b,) bool."""
-    inside = np.zeros(len(system.parent) + 1, dtype=bool)
-    inside[hinge + 1] = True
-    for later in range(hinge + 1, len(system.parent)):
-        inside[later + 1] |= inside[system.parent[later]]
-    return inside
+    inside = []
+    for body in range(len(system.parent) + 1):
+        above = body
+        while above > 0 and above != hinge + 1:
+            above = int(system.parent[above - 1])
+        inside.append(above == hinge + 1)
+    return np.array(inside)
 
 
 def poses(system: HingeSystem, quarters: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Transforms of all bodies with hinge ``h`` turned by ``quarters[h]`` times 90°.
-
-    Returns
-    -------
-    (b, 4, 4) float64 array
-    """
-    out = np.tile(np.eye(4), (len(system.parent) + 1, 1, 1))
+    """Transforms (b, 4, 4) of all bodies with hinge ``h`` turned by ``quarters[h]`` times 90°."""
+    out = [np.eye(4)]
     for h, parent in enumerate(system.parent):
-        turn = rotation_about(
-            np.asarray(system.point2)[h] / 2.0, np.eye(3)[system.axis[h]], 90.0 * quarters[h]
-        )
-        out[h + 1] = out[parent] @ turn
-    return out
+        middle, axis = np.asarray(system.point2)[h] / 2.0, np.eye(3)[system.axis[h]]
+        out.append(out[parent] @ turn_about(middle, axis, 90.0 * quarters[h]))
+    return np.array(out)
 
 
 def _cells(system: HingeSystem, pose: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -166,7 +214,7 @@ def turn_overlap(
     count = max(1, round(90.0 * abs(turn) / step_deg))
     for share in np.linspace(0.0, 1.0, count + 1):
         angle = 90.0 * turn * share
-        spin = rotation_about(point, axis, angle)
+        spin = turn_about(point, axis, angle)
         moved = (centre[pairs[:, 0]] @ spin[:3, :3].T + spin[:3, 3])[:, (u, v)]
         cosine, sine = spin[u, u], spin[v, u]
         half = 0.5 * (1.0 + abs(cosine) + abs(sine))
@@ -219,7 +267,7 @@ def barrel_meetings(
     pose = poses(system, np.asarray(quarters, dtype=float))
     inside = subtree(system, hinge)
     middles = np.asarray(system.point2) / 2.0
-    half = (0.5 - INSET) * np.eye(3)[np.asarray(system.axis, dtype=int)]
+    half = (0.5 - BARREL_INSET) * np.eye(3)[np.asarray(system.axis, dtype=int)]
     ends = np.stack([middles - half, middles + half], axis=1)
     frame = pose[1:]
     ends = np.einsum("hij,hkj->hki", frame[:, :3, :3], ends) + frame[:, None, :3, 3]
@@ -228,14 +276,14 @@ def barrel_meetings(
     parent = pose[system.parent[hinge]]
     axis = parent[:3, :3] @ np.eye(3)[system.axis[hinge]]
     point = (parent @ np.append(middles[hinge], 1.0))[:3]
+    shares = np.linspace(0.0, 1.0, max(1, round(90.0 * abs(turn) / step_deg)) + 1)
+    spins = np.array([turn_about(point, axis, 90.0 * turn * share) for share in shares])
     found = set()
-    for share in np.linspace(0.0, 1.0, max(1, round(90.0 * abs(turn) / step_deg)) + 1):
-        spin = rotation_about(point, axis, 90.0 * turn * share)
-        for g in carried:
-            moved = ends[g] @ spin[:3, :3].T + spin[:3, 3]
-            for other in staying:
-                if segment_distance(moved, ends[other]) < LEAST - 1e-3:
-                    found.add((g, other))
+    for g in carried:
+        moved = np.einsum("aij,kj->aki", spins[:, :3, :3], ends[g]) + spins[:, None, :3, 3]
+        for other in staying:
+            if segment_distance(moved, ends[other][None]).min() < BARREL_LEAST - ROUNDING:
+                found.add((g, other))
     return sorted(found)
 
 
@@ -386,11 +434,14 @@ def _plate_meets(  # noqa: PLR0911 - one kind of thing after the other
     elif kind == "barrel":
         if (line == 2) == upright:
             return False
-        least = POST_LEAST
-        mine = [PLATE_CORE, PLATE_CORE]
+        # A ball about any point of the plate's core, as wide as the plate is thick, lies in it.
+        least = PLATE_ROOM + PLATE_THICK / 2 - ROUNDING
+        core = 0.5 - PLATE_ROOM - PLATE_THICK / 2
+        mine = [core, core]
         theirs = (0.0, 0.0)
         if upright:
-            theirs = (BARREL_HALF * (line == 0), BARREL_HALF * (line == 1))
+            half = 0.5 - BARREL_INSET
+            theirs = (half * (line == 0), half * (line == 1))
         else:
             mine[normal] = 0.0
     else:
@@ -399,10 +450,11 @@ def _plate_meets(  # noqa: PLR0911 - one kind of thing after the other
         if upright:
             mine, theirs = [0.5, 0.5], (0.5, 0.5)
         else:
-            least = PLATE_LEAST
-            mine = [PLATE_HALF, PLATE_HALF]
+            least = PLATE_LEAST - ROUNDING
+            half = 0.5 - PLATE_ROOM
+            mine = [half, half]
             mine[normal] = 0.0
-            theirs = (PLATE_HALF * (line != 0), PLATE_HALF * (line != 1))
+            theirs = (half * (line != 0), half * (line != 1))
     size = (mine[0], mine[1])
     for angle in angles:
         cosine, sine = np.cos(angle), np.sin(angle)
@@ -419,7 +471,7 @@ def _plate_meets(  # noqa: PLR0911 - one kind of thing after the other
 
 
 def stuck(system: HingeSystem, quarters: NDArray[np.integer], way: int) -> int:
-    """Closure test by the definition; see :func:`fabfold.fold.turns.count_stuck`."""
+    """Hinges that the closure test finds stuck, counted by its definition."""
     hinges = len(system.parent)
     if not state_is_valid(system, quarters):
         return hinges

@@ -1,9 +1,9 @@
-"""Sweeps of cells that are only partly there: their cores, which carving always leaves.
+"""Cells that the core of a cell sweeps in a quarter turn: what carving always leaves of it.
 
 A cell that loses its corners to carving still has its core, the concentric cube of half the side
-`half_side`. Cores pass each other where whole cells interlock, so a planner that looks at cores
-finds the paths that carving can make free. It has to look at the sweeps of whole cells as well, to
-carve as little as it can.
+:data:`CORE_HALF_SIDE`. Cores pass each other where whole cells clash, so a planner that looks at
+cores finds the paths that carving can make free. It has to look at the sweeps of whole cells as
+well, to carve as little as it can.
 """
 
 # mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
@@ -18,19 +18,33 @@ from numpy.typing import NDArray
 
 from fabfold.lattice.sweep import SweepTable, sweep_table
 
-__all__ = ["CORE", "core_table", "cores_meet"]
+__all__ = ["CORE_HALF_SIDE", "core_arcs_overlap", "core_sweep_table"]
 
 #: Half the side of a cell's core. A core beside the axis turns past the one next to it, its
 #: corner at 0.825 √2 = 1.167 and the other's near face at 1.175; and 0.65³, 27 % of a cell, stay
 #: in the middle when all its edges and corners are gone.
-CORE = 0.325
+CORE_HALF_SIDE = 0.325
 
 
 @njit(cache=True)
-def cores_meet(a: int, b: int, c: int, d: int, margin: float) -> bool:
+def core_arcs_overlap(a: int, b: int, c: int, d: int, margin: float) -> bool:
     """Whether, at some radius, the arc of core (c, d) ends after the arc of core (a, b) begins.
 
     As :func:`fabfold.lattice.sweep.arcs_overlap`, for squares less a margin on all sides.
+
+    Parameters
+    ----------
+    a, b : int
+        Lower corner of the first cell's square, at least 0, lattice units from the axis.
+    c, d : int
+        Lower corner of the second cell's square, likewise.
+    margin : float
+        How far a core stays from the sides of its cell, lattice units.
+
+    Returns
+    -------
+    bool
+        True where the first core, turning, runs into the second.
     """
     a0, a1, b0 = a + margin, a + 1.0 - margin, b + margin
     c0, d0, c1, d1 = c + margin, d + margin, c + 1.0 - margin, d + 1.0 - margin
@@ -75,21 +89,27 @@ def _kept(
             for i in range(start[a * side + b], start[a * side + b + 1]):
                 c, d = cells[i, 0], cells[i, 1]
                 if c >= 0:
-                    kept[i] = cores_meet(a, b, c, d, margin)
+                    kept[i] = core_arcs_overlap(a, b, c, d, margin)
                 else:  # the second quadrant, turned back by 90°
-                    kept[i] = cores_meet(d, -c - 1, a, b, margin)
+                    kept[i] = core_arcs_overlap(d, -c - 1, a, b, margin)
     return kept
 
 
 @cache
-def core_table(reach: int, half_side: float = CORE) -> SweepTable:
+def core_sweep_table(reach: int, half_side: float = CORE_HALF_SIDE) -> SweepTable:
     """As :func:`fabfold.lattice.sweep.sweep_table`, for the cores of whole cells.
 
     Parameters
     ----------
     reach : int
+        Distance from the axis up to which the table must say what is swept, lattice units.
     half_side : float
-        Half the side of a core, above 0 and at most 0.5.
+        Half the side of a core in lattice units, above 0 and at most 0.5.
+
+    Returns
+    -------
+    SweepTable
+        Of the same form; that of barrels and link plates does not change.
 
     Raises
     ------
