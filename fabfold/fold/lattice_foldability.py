@@ -35,6 +35,7 @@ def octants_of(subvoxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
     Returns
     -------
     (n, 2, 2, 2) bool array
+        By the halves along x, y and z, the lower half first.
     """
     count, size = subvoxels.shape[:2]
     half = size // 2
