@@ -14,7 +14,8 @@ HOME = Path(__file__).parents[1]
 PAGES = [HOME / "README.md", *sorted((HOME / "docs").glob("*.md"))]
 #: What takes minutes, or a cluster, and what stands in for it here.
 STAND_INS = {
-    '"sample:car"': '"bar.stl", template="box-2x2x2", effort="quick"',
+    ', effort="quick"': "",
+    'from_model("sample:car"': 'from_model("bar.stl", template="box-2x2x2", effort="quick"',
     'load_template("box-4x4x4")': 'load_template("box-2x2x2")',
     'seconds=60, scheduler="tcp://host:8786"': "seconds=0",
 }
@@ -47,7 +48,7 @@ def test_the_code_of_a_page_runs(page, bar, bar_kit, tmp_path, monkeypatch):
     code = code_of(page)
     for original, stand_in in STAND_INS.items():
         code = code.replace(original, stand_in)
-    exec(compile(code, page, "exec"), {"__name__": page.stem})
+    exec(compile(code, page, "exec"), {"__name__": "__main__"})
 
 
 @pytest.mark.parametrize("path", WITH_EXAMPLES, ids=lambda path: str(path.relative_to(HOME)))
