@@ -14,8 +14,8 @@ from carving_models import (
     full_material,
     tree_of,
 )
-from fold_oracle import TOUCH, turn_overlap
-from test_fold_lattice import random_system
+from fold_oracle import TOUCH, plate_meetings, plates, turn_overlap
+from test_fold_lattice import random_system, with_links
 
 from fabfold.fold.carving_plan import CarvingPlan, carved_path, plan_carving
 from fabfold.fold.clashes import clashes_on
@@ -89,6 +89,24 @@ def test_whole_cubes_block_and_cores_pass(slot):
     assert find_path(system, carve=CORE_HALF_SIDE).path.tolist() == path.tolist()
     assert count_free_moves(system, path) == 0
     assert count_free_moves(system, path, carve=CORE_HALF_SIDE) == 1
+
+
+def test_cores_of_systems_with_link_plates_are_planned():
+    planned = 0
+    for seed in range(16):
+        system = with_links(random_system((3, 2, 1), 3, seed, 0), seed)
+        found = find_path(system, carve=CORE_HALF_SIDE)
+        if find_path(system).path is not None:
+            assert found.path is not None, seed
+        if found.path is not None:
+            assert count_free_moves(system, found.path, carve=CORE_HALF_SIDE) == len(found.path)
+            # Plates are never carved: whatever they sweep over must be out of the way.
+            q = np.zeros(len(system.parent), dtype=int)
+            for hinge, turn in found.path.tolist():
+                assert not plate_meetings(system, q, hinge, turn)
+                q[hinge] += turn
+            planned += len(plates(system)) > 0
+    assert planned >= 3
 
 
 def test_clashes_are_the_overlaps_of_cubes():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import fcl
 import joinery_models
 import numpy as np
 import pytest
@@ -159,8 +160,6 @@ def test_a_barrel_in_its_sleeve_keeps_the_radial_gap():
 
 
 def test_bounds_hold_the_distances_of_an_independent_sampling():
-    import fcl
-
     rng = np.random.default_rng(7)
 
     def model(triangles):
@@ -199,8 +198,6 @@ def test_bounds_hold_the_distances_of_an_independent_sampling():
 
 
 def test_triangle_distance_against_fcl():
-    import fcl
-
     rng = np.random.default_rng(1)
     for trial in range(200):
         one = rng.normal(size=(3, 3))

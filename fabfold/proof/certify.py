@@ -97,6 +97,7 @@ def _load(
     voxel_mm: float,
     origin_mm: Sequence[float],
 ) -> _Bodies:
+    """Triangles of all bodies, and the trees over them; refuses what is no mesh."""
     if len(meshes) != len(tree.bodies):
         raise ValueError(f"{len(tree.bodies)} bodies, but {len(meshes)} meshes")
     triangles = []

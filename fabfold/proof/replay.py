@@ -10,8 +10,8 @@ proof is :mod:`fabfold.proof.certify`, the independent opinion :mod:`fabfold.pro
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,16 +68,6 @@ class ReplayReport:
     contact_steps: int
     steps: int
     geometry: str
-
-    def to_json(self) -> dict[str, Any]:
-        """The report as plain values.
-
-        Returns
-        -------
-        dict
-            One entry for each attribute.
-        """
-        return asdict(self)
 
 
 def material_boxes(
