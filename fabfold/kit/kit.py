@@ -474,12 +474,8 @@ def open_kit(
         Path of a model, a recipe or a kit folder; or ``sample:NAME``.
     folder : Path or None
         Kit folder; for a kit folder or its ``kit.toml`` the default is that folder.
-    workers : int or None
-        Processes of the search; None takes one a core. Changes no result.
-    scheduler : str or None
-        Address of a Dask scheduler, whose workers search instead. Changes no result.
-    seconds : float or None
-        Search for so long and take the best; depends on the speed of the machine.
+    workers, scheduler, seconds
+        How the search runs, as of :class:`Kit`.
     **options
         Fields of the recipe; those that are None keep the recipe's or the default value.
 
