@@ -3,8 +3,8 @@
     python benchmarks/libraries.py
 
 Random numbers in a compiled kernel: splitmix64 (`fabfold.tree.rng`) beside NumPy's Generator, which
-numba supports. OFF files: our reader beside trimesh's, on a fine sphere, and on files that are wrong.
-Prints two tables.
+numba supports. OFF files: our reader beside trimesh's, on a fine sphere, and on wrong files. Prints
+two tables.
 """
 
 from __future__ import annotations
