@@ -92,19 +92,19 @@ def test_every_public_name_resolves():
     ],
 )
 def test_keywords_types_and_defaults_are_told_once(part, options, keywords):
-    parameters = inspect.signature(part).parameters
-    own = [name for name in parameters if name not in ("length", "size", *PLACEMENT)]
-    assert set(own) == {field.name for field in fields(options)} == set(get_annotations(keywords))
+    parameters = inspect.signature(part.__init__).parameters
+    own = [name for name in parameters if name not in ("self", "length", "size", *PLACEMENT)]
+    assert set(own) == {field.name for field in fields(options)} == set(annotations_of(keywords))
     for field in fields(options):
         parameter = parameters[field.name]
         assert parameter.kind is inspect.Parameter.KEYWORD_ONLY
         assert parameter.default == field.default
-        assert parameter.annotation == field.type == get_annotations(keywords)[field.name]
+        assert parameter.annotation == field.type == annotations_of(keywords)[field.name]
     with pytest.raises(TypeError, match="thickness"):
         options(thickness=2.0)
 
 
-def get_annotations(keywords):
+def annotations_of(keywords):
     """What a TypedDict's keys are annotated with, as it is written."""
     found = {}
     for name, kind in keywords.__annotations__.items():
