@@ -27,14 +27,23 @@ HERE = Path(__file__).resolve().parent
 
 
 def start(module, *arguments, without_fabfold=False):
-    """A command of Dask in a process of its own, in a folder that is none of ours."""
-    block = "import sys; sys.modules['fabfold'] = None; " if without_fabfold else ""
-    code = f"{block}from distributed.cli.{module} import main; main()"
+    """A command of Dask in a process of its own, in a folder that is none of ours.
+
+    It ends with the tests: its standard input closes when nobody is left who holds the other end.
+    """
+    block = "sys.modules['fabfold'] = None; " if without_fabfold else ""
+    code = (
+        "import os, sys, threading; "
+        "end = lambda: (sys.stdin.read(), os._exit(1)); "
+        "threading.Thread(target=end, daemon=True).start(); "
+        f"{block}from distributed.cli.{module} import main; main()"
+    )
     environment = dict(os.environ, PYTHONPATH=f"{HERE.parent}{os.pathsep}{HERE}")
     return subprocess.Popen(
         [sys.executable, "-W", "ignore", "-c", code, *map(str, arguments)],
         cwd="/",
         env=environment,
+        stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
