@@ -139,6 +139,7 @@ def test_the_answer_is_that_of_this_machine(problem, alone, dask):
         assert heard.better[seed][-1].energy["total"] == result.best
 
 
+@pytest.mark.slow
 def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alone, dask):
     heard = Results()
     judge = Poisoned(first_question(problem, 1, EFFORT))
@@ -149,6 +150,7 @@ def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alo
     assert heard.done[1].why == "seed 1 took its worker down 3 times"
 
 
+@pytest.mark.slow
 def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, dask):
     heard = Results()
     job = Job(problem, LatticeFoldability(), replace(EFFORT, polish_best=10**9))
@@ -183,6 +185,7 @@ def test_an_interrupted_search_leaves_the_workers_free(problem, alone, dask):
     assert key(found) == key(alone)
 
 
+@pytest.mark.slow
 def test_a_worker_killed_half_way_costs_its_seed_alone(problem, alone, tmp_path):
     made = Dask(tmp_path)
     try:
@@ -220,6 +223,7 @@ def test_a_worker_killed_half_way_costs_its_seed_alone(problem, alone, tmp_path)
         made.close()
 
 
+@pytest.mark.slow
 def test_without_workers_or_with_foreign_ones_it_is_said(problem, tmp_path, monkeypatch):
     made = Dask(tmp_path)
 
@@ -248,6 +252,7 @@ def test_without_workers_or_with_foreign_ones_it_is_said(problem, tmp_path, monk
         made.close()
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_told(problem, tmp_path, monkeypatch):
     monkeypatch.setattr("fabfold.search.dask.CONNECT", 5.0)
     made = Dask(tmp_path)

@@ -246,6 +246,7 @@ def test_planner_and_closure_agree_with_brute_force(shape, quarter):
     assert folding >= 3
 
 
+@pytest.mark.slow
 def test_links_without_cells_fold_as_brute_force_says():
     folding = 0
     for seed in range(40):

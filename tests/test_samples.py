@@ -93,6 +93,7 @@ def test_is_chunky_enough_for_its_box(name: str) -> None:
     assert touched < 1.6 * cells
 
 
+@pytest.mark.slow
 def test_same_bytes_every_time() -> None:
     first, second = loaded("duck"), load_model("sample:duck")
     assert first.vertices.tobytes() == second.vertices.tobytes()

@@ -65,6 +65,7 @@ def test_known_seeds_are_not_searched_again(problem, alone):
     assert key(again) == key(alone)
 
 
+@pytest.mark.slow
 def test_a_killed_worker_costs_nothing(problem, alone, tmp_path):
     judge = Deadly(tmp_path, deaths=1)
     found = search(problem, range(4), judge, EFFORT, workers=2)
@@ -72,6 +73,7 @@ def test_a_killed_worker_costs_nothing(problem, alone, tmp_path):
     assert key(found) == key(alone)
 
 
+@pytest.mark.slow
 def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alone):
     heard = Results()
     judge = Poisoned(first_question(problem, 2, EFFORT))
@@ -82,6 +84,7 @@ def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alo
     assert not any(heard.done[seed].failed for seed in (0, 1, 3))
 
 
+@pytest.mark.slow
 def test_a_seed_that_raises_is_left_out_and_the_others_return(problem, alone):
     for workers in (1, 2):
         heard = Results()

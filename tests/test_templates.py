@@ -240,6 +240,7 @@ def test_a_mesh_of_blocks_becomes_exactly_its_blocks():
     assert len(template_of_solid(u, 14)) == 14
 
 
+@pytest.mark.slow
 def test_the_number_of_cells_is_met_about():
     box = blocks(((0, 0, 0), (30, 20, 11)))
     for wanted in (27, 100, 400):

@@ -61,6 +61,7 @@ def tree():
     return found[0]
 
 
+@pytest.mark.slow
 def test_rows_of_each_set_of_joints():
     count = {
         name: Counter(row[0].kind for row in joint_types(name)) for name in ("S", "S90", "all")
@@ -147,6 +148,7 @@ def two_cubes(first, q1, second, q2):
     )
 
 
+@pytest.mark.slow
 def test_the_filter_agrees_with_the_planner_on_two_cubes():
     tables = hinge_tables()
     source = np.array([[0, 0, 0], [1, 0, 0]], dtype=np.int32)

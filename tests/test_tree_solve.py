@@ -15,7 +15,7 @@ from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.solve import solve
 from fabfold.tree.system import hinge_system
 
-QUICK = Effort(polish_best=100, restarts=10)
+QUICK = Effort(polish_best=100, polish_each=60, starts=3, restarts=10)
 
 
 def energies(candidates):
@@ -131,6 +131,7 @@ def test_candidates_differ(dog_trees):
         assert all(one != other for other in hinges[:i])
 
 
+@pytest.mark.slow
 def test_same_seed_same_trees_also_through_pickle(dog, dog_trees):
     again = solve(pickle.loads(pickle.dumps(dog)), 0, LatticeFoldability(), QUICK)
     assert [c.tree.to_json(1.0, (0.0, 0.0, 0.0)) for c in again] == [
