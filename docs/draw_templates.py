@@ -84,11 +84,11 @@ def kit() -> None:
     from fabfold.kit.kit import Kit
 
     made = Kit.from_model("sample:car", template="map-48", seed=1, effort="quick").join()
-    tree, motion = made.planned.tree, made.planned.motion
+    tree, motion = built.planned.tree, built.planned.motion
     folds = len(load_template("map-48").creases)
     view = View(azimuth_deg=-60.0, elevation_deg=30.0, size=(480, 380))
     states = [motion.angles_deg[0], motion.angles_deg[-1 - folds], motion.angles_deg[-1]]
-    images = [picture_of_kit(made.joinery, tree, angles, view) for angles in states]
+    images = [picture_of_kit(built.joinery, tree, angles, view) for angles in states]
     write_bytes(HOME / "car-map-48.png", png_bytes(row(images)))
 
 

@@ -20,8 +20,8 @@ def main(folder: str = "car-kit") -> None:
         f"The car is cut into at most {len(kit.template)} voxels; the first cut has {len(voxels)}."
     )
 
-    made = kit.join()
-    tree, motion = made.planned.tree, made.planned.motion
+    built = kit.join()
+    tree, motion = built.planned.tree, built.planned.motion
     print(f"{len(tree.bodies)} bodies hang on {len(tree.hinges)} hinges.")
     print(f"It folds in {len(motion.moves) - 1} moves.")
     print(f"On the way no two bodies come nearer than {motion.certificate['min_gap_mm']:.2f} mm.")

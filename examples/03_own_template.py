@@ -40,8 +40,8 @@ def main(folder: str = "stairs-kit") -> None:
     trimesh.creation.box((10.0 * len(stairs), 10.0, 10.0)).export(ruler)
 
     kit = Kit.from_model(ruler, template=str(template), folder=home, effort="quick")
-    made = kit.join()
-    tree, motion = made.planned.tree, made.planned.motion
+    built = kit.join()
+    tree, motion = built.planned.tree, built.planned.motion
     print(f"The ruler is {len(tree.source)} voxels and bends at {len(tree.hinges)} hinges.")
     for number, moving in enumerate(motion.moves[1:], start=1):
         turned = motion.angles_deg[number] - motion.angles_deg[number - 1]

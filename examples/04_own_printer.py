@@ -40,9 +40,9 @@ def main(folder: str = "my-printer") -> None:
     kit = Kit.from_model(
         bar, template="box-2x2x2", profile=str(profile), folder=home / "bar-kit", effort="quick"
     )
-    made = kit.join()
-    gap = made.planned.motion.certificate["min_gap_mm"]
-    print(f"The hinges have {made.joinery.clearance_mm:g} mm of clearance.")
+    built = kit.join()
+    gap = built.planned.motion.certificate["min_gap_mm"]
+    print(f"The hinges have {built.joinery.clearance_mm:g} mm of clearance.")
     print(f"Gaps under {mine.min_gap_mm:g} mm may close in print; the smallest is {gap:.2f} mm.")
     kit.export()
 
