@@ -83,7 +83,7 @@ def kit() -> None:
     """A printed object as model, as flat template, and as box."""
     from fabfold.kit.kit import Kit
 
-    made = Kit.from_model("sample:car", template="map-48", seed=1, effort="quick").join()
+    built = Kit.from_model("sample:car", template="map-48", seed=1, effort="quick").join()
     tree, motion = built.planned.tree, built.planned.motion
     folds = len(load_template("map-48").creases)
     view = View(azimuth_deg=-60.0, elevation_deg=30.0, size=(480, 380))
