@@ -14,7 +14,8 @@ from build123d import Box, Mode, Plane, Pos
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from fabfold.export.render import Mesh, View, render
+from fabfold.export.camera import View
+from fabfold.export.render import Mesh, render
 from fabfold.files import write_bytes
 from hinges import (
     Bracket,
