@@ -147,7 +147,7 @@ def write_step(
     """
     from fabfold.version import __version__
 
-    told = progress or SilentProgress()
+    progress = progress or SilentProgress()
     if colours is None:
         colours = palette(len(joinery.bodies)) if tree is None else body_colours(tree)
     # Without the tree nothing tells barrels from sculpted surfaces, so nothing is thinned.
@@ -156,7 +156,7 @@ def write_step(
     application = f"fabfold {__version__}"
     solids, plain, volume = [], [], 0.0
     for index, body in enumerate(joinery.bodies):
-        told.update(index / len(joinery.bodies), body.name)
+        progress.update(index / len(joinery.bodies), body.name)
         red, green, blue = (int(value) for value in colours[index])
         brep, level, measured = _sound_brep(body, axes[index], thin_mm, application)
         solids.append(StepSolid(body.name, brep, (red, green, blue)))
@@ -164,7 +164,7 @@ def write_step(
         if level != _LEVELS[0]:
             plain.append(body.name)
     write_text(path, step_text(solids, title or path.stem, application))
-    told.update(1.0, f"{len(solids)} solids")
+    progress.update(1.0, f"{len(solids)} solids")
     faces = [face for solid in solids for face in solid.brep.faces]
     return StepFacts(
         solids=len(solids),

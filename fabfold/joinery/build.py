@@ -98,10 +98,10 @@ def build_bodies(
     ----------
     Zhou et al., "Boxelization: folding 3D objects into boxes", section 4.3.
     """
-    told = progress or SilentProgress()
+    progress = progress or SilentProgress()
     _check_inputs(voxels, tree, motion, voxel_mm, clearance_mm)
     size = hinge_size(voxel_mm, clearance_mm, barrel_radius_mm, pin_radius_mm, knuckles)
-    told.update(0.0, "preparing the model and the hinges")
+    progress.update(0.0, "preparing the model and the hinges")
     _refuse_colliding_barrels(tree, motion, size, voxel_mm)
     model = model_manifold(voxels, voxel_mm)
     hinges = place_hinges(tree, motion, size, voxel_mm)
@@ -123,7 +123,7 @@ def build_bodies(
     origin = voxel_mm * (0.5 - tree.source.min(axis=0).astype(float))
     meshes = []
     for index, body in enumerate(tree.bodies):
-        told.update(index / len(tree.bodies), f"cutting {body.name}")
+        progress.update(index / len(tree.bodies), f"cutting {body.name}")
         cutter = BodyCutter(
             index, tree, hinges, past_barrels[index], past_plates[index], size, voxel_mm
         )
@@ -134,7 +134,7 @@ def build_bodies(
         )
         vertices, faces = printable_body(solid, body.name, origin)
         meshes.append(BodyMesh(body.name, vertices, faces))
-    told.update(1.0, f"{len(meshes)} bodies, {tally.struts} struts")
+    progress.update(1.0, f"{len(meshes)} bodies, {tally.struts} struts")
     x, y, z = origin.tolist()
     return Joinery(
         bodies=tuple(meshes),

@@ -49,20 +49,20 @@ def check_bodies(
     list of Check
         Each with its figure, limit and verdict, in the order of the report.
     """
-    told = progress or SilentProgress()
-    told.update(0.0, "reading the bodies")
-    checks = check_topology(joinery, told)
+    progress = progress or SilentProgress()
+    progress.update(0.0, "reading the bodies")
+    checks = check_topology(joinery, progress)
     try:
         solids = [as_manifold(body.vertices, body.faces, body.name) for body in joinery.bodies]
     except GeometryError as error:
         # Nothing below can be measured on a mesh that is no solid.
         return [*checks, Check("bodies are solids", 1.0, 0.0, "bodies", False, str(error))]
-    told.update(0.4, "gaps between bodies")
+    progress.update(0.4, "gaps between bodies")
     checks += check_gaps(joinery, tree, solids, profile)
-    told.update(0.6, "walls")
+    progress.update(0.6, "walls")
     checks += check_walls(joinery, solids, profile)
-    told.update(0.9, "sizes and overhangs")
+    progress.update(0.9, "sizes and overhangs")
     checks += check_sizes(joinery, tree, motion, profile)
     checks.append(check_overhang(joinery, profile))
-    told.update(1.0, f"{len(checks)} checks")
+    progress.update(1.0, f"{len(checks)} checks")
     return checks

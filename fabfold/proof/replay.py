@@ -267,7 +267,7 @@ def replay(
     """
     import mujoco
 
-    told = progress or SilentProgress()
+    progress = progress or SilentProgress()
     if gap_mm is None:
         gap_mm = float(motion.certificate.get("min_gap_mm", 0.015 * voxel_mm))
     carved = _carved_voxels(tree, motion)
@@ -283,7 +283,7 @@ def replay(
     touching = steps = 0
     moves = len(motion.moves) - 1
     for number in range(1, moves + 1):
-        told.update((number - 1) / moves, f"replaying move {number} of {moves}")
+        progress.update((number - 1) / moves, f"replaying move {number} of {moves}")
         start, end = np.radians(motion.angles_deg[number - 1 : number + 1])
         quarters = float(np.abs(end - start).max() / (np.pi / 2))
         count = max(1, round(seconds_per_quarter * quarters / _TIME_STEP))
@@ -307,7 +307,7 @@ def replay(
                 "the bodies press against each other"
             )
     angles = np.degrees(data.qpos[joint])
-    told.update(1.0, f"deepest contact {deepest * voxel_mm:.3f} mm")
+    progress.update(1.0, f"deepest contact {deepest * voxel_mm:.3f} mm")
     links = sum(body.edge is not None for body in tree.bodies)
     cores = f", {len(carved)} carved cells by their cores" if carved else ""
     sheets = f", {links} link plates as sheets between them" if links else ""

@@ -268,7 +268,7 @@ def sample_path(
     ValueError
         If a body has no mesh, more than one hinge turns in a move, or a step is not above 0.
     """
-    told = progress or SilentProgress()
+    progress = progress or SilentProgress()
     gap_step = step_deg if gap_step_deg is None else gap_step_deg
     if not (step_deg > 0 and gap_step > 0):
         raise ValueError("step_deg and gap_step_deg must be above 0")
@@ -283,7 +283,7 @@ def sample_path(
         return linkage.poses(dict(zip(hinges, angles.tolist(), strict=True)))
 
     watch = _Sightings()
-    told.update(0.0, "looking at shape A")
+    progress.update(0.0, "looking at shape A")
     _see_start(watch, meshes, poses_at(frames[0]))
     overlap = _overlap(meshes, poses_at(frames[0])) + _overlap(meshes, poses_at(frames[-1]))
     total = len(frames) - 1
@@ -295,9 +295,9 @@ def sample_path(
         hinge = hinges[int(turning[0])]
         turn = float((after - before)[turning[0]])
         move = f"move {number} of {total} ({hinge})"
-        told.update((number - 1) / total, f"looking at {move}")
+        progress.update((number - 1) / total, f"looking at {move}")
         _see_move(watch, linkage, meshes, poses_at(before), hinge, turn, move, step_deg, gap_step)
-    told.update(1.0, f"{watch.poses} poses, smallest gap {watch.least:.3f} mm")
+    progress.update(1.0, f"{watch.poses} poses, smallest gap {watch.least:.3f} mm")
     return SampledPath(
         step_deg=step_deg,
         gap_step_deg=gap_step,
