@@ -28,8 +28,8 @@ __all__ = ["LADDER", "Solution", "picked", "solutions", "undominated"]
 #: Steps of the knob between fewest hinges (0) and best surface (1).
 LADDER = (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Where the seeds of the ladder begin within those of a recipe, and how many a step may use.
-_SHIFT = 5_000
-_STEP = 1_000
+_SHIFT = 500_000
+_STEP = 100_000
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def solutions(
     ]
     why = ""
     fits = False
-    from fabfold.search.rounds import SEEDS_PER_ROUND
+    from fabfold.search.schedule import SEEDS_PER_ROUND
 
     most = min(recipe.rounds, _STEP // SEEDS_PER_ROUND)
     for number in range(most):
@@ -179,7 +179,7 @@ def _round(
         def tasks() -> Iterator[tuple[int, Job | SeedResult]]:
             for seed, step in owner.items():
                 if seed not in results:
-                    yield seed, ladder[step].job(seed)
+                    yield seed, ladder[step].job(number, seed)
 
         with open_progress(f"pareto-{number}") as progress:
             tally = Tally(progress, results, lambda done: done / len(owner), len(owner))

@@ -1,4 +1,4 @@
-"""Rounds of the search: seeds by the handful, each with the next voxelization."""
+"""Rounds of the search: seeds by the handful, the later ones where the earlier ones found most."""
 
 from __future__ import annotations
 
@@ -15,20 +15,14 @@ from fabfold.lattice.template import Template
 from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
 from fabfold.recipe.recipe_wishes import weights_of, wished
-from fabfold.search.run import (
-    Budget,
-    Tally,
-    executor,
-    require_fit,
-    run_seeds,
-    search_tasks,
-    warm_up,
-)
+from fabfold.search.run import Budget, Tally, executor, require_fit, run_seeds, warm_up
 from fabfold.search.saved import SeedCache
-from fabfold.search.seeds import Event, Job, SeedResult
+from fabfold.search.schedule import GAIN, SEEDS_PER_ROUND, Rung, schedule
+from fabfold.search.seeds import Event, Executor, Job, SeedResult
 from fabfold.store import StageStore, stage_key
+from fabfold.tree.bound import closed_at_most, closed_share
 from fabfold.tree.candidate import Candidate
-from fabfold.tree.effort import EFFORTS
+from fabfold.tree.effort import Effort
 from fabfold.tree.problem import from_features
 from fabfold.tree.template_parts import restrict_to_parts
 from fabfold.voxels.features import features
@@ -38,13 +32,11 @@ from fabfold.wishes.wish_list import Wishes
 
 __all__ = ["Rounds", "search_order"]
 
-#: Seeds in one round; a constant, so that results do not depend on the workers.
-SEEDS_PER_ROUND = 4
 #: Templates of more cells are large: near misses are locked by more than corners.
 LARGE = 72
 #: Distance of the search's first seeds for recipe seeds that follow each other: more than
 #: any recipe's rounds use, so that two recipes share none.
-SEED_STRIDE = 10_000
+SEED_STRIDE = 1_000_000
 
 
 def search_order(options: Sequence[Voxels]) -> list[Voxels]:
@@ -111,6 +103,18 @@ class Batch:
     known: dict[int, SeedResult]
 
 
+@dataclass(frozen=True)
+class _Task:
+    """One seed: its number, digest, voxelization, round, effort, and the tree that it goes on from."""
+
+    seed: int
+    key: str
+    option: int
+    number: int
+    effort: Effort
+    start: Candidate | None
+
+
 class Rounds:
     """The search of a recipe, a round at a time; every finished seed is kept.
 
@@ -121,7 +125,7 @@ class Rounds:
     template : Template
         The target shape, as it is filled.
     options : sequence of Voxels
-        Voxelizations; each seed searches the next one, see :func:`search_order`.
+        Voxelizations; :mod:`fabfold.search.schedule` tells which seeds search which.
     key : str
         Digest of all that `options` depend on.
     store : StageStore
@@ -139,6 +143,8 @@ class Rounds:
         Of the recipe.
     shift : int
         Added to the number of each seed, for searches that run beside one another.
+    on_first : callable, optional
+        Told of the first tree that folds, with its voxels, as soon as its rung is done.
     """
 
     def __init__(
@@ -155,6 +161,7 @@ class Rounds:
         seconds: float | None = None,
         wishes: Wishes | None = None,
         shift: int = 0,
+        on_first: Callable[[Found], None] | None = None,
     ) -> None:
         self.recipe = recipe
         self.template = template
@@ -167,7 +174,12 @@ class Rounds:
         self._key = key
         self._cache = SeedCache(store)
         self._open_progress = open_progress
+        self._on_first = on_first
         self._jobs: dict[int, Job | SeedResult] = {}
+        self._option_of: dict[int, int] = {}
+        self._origin: dict[int, int] = {}
+        self._at_most: dict[int, float] = {}
+        self._closing: list[int] | None = None
         self._done: dict[int, list[Found]] = {}
         self._ranked: list[Found] | None = None
 
@@ -202,8 +214,7 @@ class Rounds:
             raise NoTreeError(why)
         if not found:
             raise NoFoldError(
-                f"no tree that folds in {self.recipe.rounds} rounds of {SEEDS_PER_ROUND} "
-                "seeds; try --effort thorough, more --rounds, another --seed or a larger template"
+                f"no tree that folds in {self.recipe.rounds} rounds of the search; try --effort thorough, more --rounds, another --seed or a larger template"
                 + self._about_wishes()
             )
 
@@ -246,58 +257,251 @@ class Rounds:
 
     def _search_for(self, seconds: float) -> dict[int, SeedResult]:
         """Results of all rounds that there is time for, and of earlier runs."""
-        keys: dict[int, str] = {}
-        known: dict[int, SeedResult] = {}
+        results: dict[int, SeedResult] = {}
         rounds = SEED_STRIDE // SEEDS_PER_ROUND
-        for number in range(rounds):
-            fresh = self._keys(number)
-            held = self._cache.known(fresh)
-            if not held:
-                break
-            keys |= fresh
-            known |= held
-
-        def searchable() -> bool:
-            """Whether any voxelization can be searched at all."""
-            jobs = any(isinstance(job, Job) for job in self._jobs.values())
-            return jobs or any(result.fits for result in tally.results.values())
-
-        def tasks() -> Iterator[tuple[int, Job | SeedResult]]:
-            for number in range(rounds):
-                tally.check_failures()
-                keys.update(self._keys(number))
-                for seed in self._seeds(number):
-                    cut = known[seed].cut if seed in known else 0.0
-                    # With no more time than it had before, a seed would not come further.
-                    if cut is not None and cut < seconds:
-                        yield seed, self.job(seed)
-                if number * SEEDS_PER_ROUND >= len(self.options) and not searchable():
-                    return
-
         if seconds <= 0:
-            return known
+            for number in range(rounds):
+                held = self._held(number)
+                if not held:
+                    break
+                results |= held
+            return results
         with self._open_progress("fit") as progress:
             budget = Budget(seconds)
-            tally = Tally(progress, known, lambda _done: budget.share)
+            tally = Tally(progress, {}, lambda _done: budget.share, describe=self.describe)
             with executor(self.workers, self.scheduler, rounds, budget.over) as pool:
-
-                def on_event(event: Event) -> None:
-                    tally.on_event(self._cache.keep(event, keys[event.seed], seconds))
-
                 progress.update(None, "getting ready")
                 warm_up(pool, self.recipe.joints)
                 budget.restart()
-                run_seeds(pool, tasks(), on_event, budget.over)
+                for number in range(rounds):
+                    results |= self._search_round(number, pool, tally, budget)
+                    tally.check_failures()
+                    if budget.over() or not self._searchable(results):
+                        break
         tally.check_failures()
-        return tally.results
+        return results
 
-    def _option(self, seed: int) -> int:
-        """Number of the voxelization that a seed searches."""
-        return (seed - self._seeds(0)[0]) % len(self.options)
+    def _searchable(self, results: Mapping[int, SeedResult]) -> bool:
+        """Whether any voxelization that was looked at can be searched at all."""
+        jobs = any(isinstance(job, Job) for job in self._jobs.values())
+        return jobs or any(result.fits for result in results.values())
+
+    def _round(self, number: int) -> list[Found]:
+        """Trees that a round finds, each seed run to its end."""
+        if number in self._done:
+            return self._done[number]
+        whole = self._held(number, whole=True)
+        results = whole
+        if not self._is_complete(number, whole):
+            with self._open_progress(f"fit-{number}") as progress:
+                total = sum(rung.seeds for rung in self._rungs(number))
+                tally = Tally(progress, {}, lambda done: done / total, total, self.describe)
+                forever = Budget()
+                with executor(self.workers, self.scheduler, total, forever.over) as pool:
+                    results = self._search_round(number, pool, tally, forever)
+                tally.check_failures()
+        require_fit([results[seed] for seed in sorted(results)])
+        self._done[number] = self._paired(results)
+        return self._done[number]
+
+    # The rungs of a round ---------------------------------------------------------------------
+
+    def _rungs(self, number: int) -> tuple[Rung, ...]:
+        return schedule(self.recipe.effort, number)
+
+    def _search_round(
+        self, number: int, pool: Executor, tally: Tally, budget: Budget
+    ) -> dict[int, SeedResult]:
+        """Run the rungs of a round, those seeds that are not done, until they no longer pay."""
+        results: dict[int, SeedResult] = {}
+        for place, rung in enumerate(self._rungs(number)):
+            before = _best(results)
+            tasks = self._tasks(number, place, results)
+            if not tasks:
+                break
+            keys = {task.seed: task.key for task in tasks}
+            known = self._cache.known(keys)
+            limit = budget.seconds
+            # With no more time than it had before, a seed would not come further.
+            done = {
+                seed: result
+                for seed, result in known.items()
+                if result.cut is None or (limit is not None and result.cut >= limit)
+            }
+            tally.include(known)
+            found: dict[int, SeedResult] = dict(known)
+
+            def on_event(
+                event: Event,
+                keys: dict[int, str] = keys,
+                found: dict[int, SeedResult] = found,
+            ) -> None:
+                event = self._cache.keep(event, keys[event.seed], budget.seconds or 0.0)
+                tally.on_event(event)
+                if event.seed in tally.results:
+                    found[event.seed] = tally.results[event.seed]
+
+            todo = ((task.seed, self._work(task)) for task in tasks if task.seed not in done)
+            run_seeds(pool, todo, on_event, budget.over)
+            results |= found
+            if place == 0 and self._on_first is not None:
+                for pair in self._paired(results)[:1]:
+                    self._on_first(pair)
+            stale = rung.takes == "best" and _best(results) > before - GAIN
+            if budget.over() or stale:
+                break
+        return results
+
+    def _held(self, number: int, whole: bool = False) -> dict[int, SeedResult]:
+        """Results of a round that earlier runs left; with `whole` those that ran to their end."""
+        results: dict[int, SeedResult] = {}
+        for place in range(len(self._rungs(number))):
+            keys = {task.seed: task.key for task in self._tasks(number, place, results)}
+            held = self._cache.known(keys)
+            if whole:
+                held = {seed: result for seed, result in held.items() if result.cut is None}
+            if not held:
+                break
+            results |= held
+        return results
+
+    def _is_complete(self, number: int, results: Mapping[int, SeedResult]) -> bool:
+        """Whether these whole results are all that a round would bring."""
+        seen: dict[int, SeedResult] = {}
+        for place, rung in enumerate(self._rungs(number)):
+            before = _best(seen)
+            tasks = self._tasks(number, place, seen)
+            if any(task.seed not in results for task in tasks):
+                return False
+            seen |= {task.seed: results[task.seed] for task in tasks}
+            if rung.takes == "best" and _best(seen) > before - GAIN:
+                break
+        return True
+
+    def _tasks(self, number: int, place: int, results: Mapping[int, SeedResult]) -> list[_Task]:
+        """What the seeds of one rung search, given the results of those before."""
+        rungs = self._rungs(number)
+        rung = rungs[place]
+        first = self._seeds(number).start + sum(other.seeds for other in rungs[:place])
+        seeds = range(first, first + rung.seeds)
+        if rung.takes == "best":
+            return [
+                self._task(number, seed, self._option_of[start.seed], rung.effort, start)
+                for seed, start in zip(seeds, self._starts(results), strict=False)
+            ]
+        order = list(range(len(self.options)))
+        if rung.takes == "closing":
+            order = self._closing_order()
+        elif rung.takes == "promising":
+            order = self._promising_order(results)
+        order = order[: rung.options]
+        return [
+            self._task(number, seed, order[k % len(order)], rung.effort)
+            for k, seed in enumerate(seeds)
+        ]
+
+    def _starts(self, results: Mapping[int, SeedResult]) -> list[Candidate]:
+        """The best tree of each seed, and of the seeds that went on from it, best first."""
+        line: dict[int, int] = {}
+        best: dict[int, Candidate] = {}
+        for seed in sorted(results):
+            for candidate in results[seed].candidates[:1]:
+                root = line.get(self._origin.get(seed, seed), self._origin.get(seed, seed))
+                line[seed] = root
+                known = best.get(root)
+                if known is None or candidate.energy["total"] < known.energy["total"]:
+                    best[root] = replace(candidate, seed=seed)
+        return sorted(best.values(), key=lambda c: (c.energy["total"], c.seed))
+
+    def _task(
+        self,
+        number: int,
+        seed: int,
+        option: int,
+        effort: Effort,
+        start: Candidate | None = None,
+    ) -> _Task:
+        recipe = self.recipe
+        self._option_of[seed] = option
+        about: list[Any] = [recipe.surface_weight, recipe.single_weight, self._carves(number)]
+        about += [*wished(recipe), repr(effort), option]
+        if start is not None:
+            self._origin[seed] = start.seed
+            about += [start.tree.to_json(1.0, (0.0, 0.0, 0.0)), start.path.tolist()]
+        return _Task(seed, stage_key(self._key, *about, seed), option, number, effort, start)
+
+    def _work(self, task: _Task) -> Job | SeedResult:
+        """What a seed searches, or its result where its voxelization rules every tree out."""
+        job = self._job(task.option, task.seed)
+        if isinstance(job, SeedResult):
+            return job
+        if self._carves(task.number):
+            material = self.options[task.option].subvoxels
+            judge = LatticeFoldability(carve=CORE_HALF_SIDE, material=material)
+            job = replace(job, foldability=judge)
+        return replace(job, effort=task.effort, start=task.start)
+
+    def _closing_order(self) -> list[int]:
+        """Voxelizations by how closed the box could be, most first; by cuts with --protect."""
+        if self._closing is None:
+            order = range(len(self.options))
+            if self.wishes.regions:
+                self._closing = list(order)
+            else:
+                most = [self.at_most(option) for option in order]
+                # Of equals the fuller one.
+                self._closing = sorted(order, key=lambda k: (-most[k], -len(self.options[k])))
+        return self._closing
+
+    def _promising_order(self, results: Mapping[int, SeedResult]) -> list[int]:
+        """Voxelizations by the best tree found on each, and what nothing was found on after."""
+        found: dict[int, float] = {}
+        for seed in sorted(results):
+            option = self._option_of[seed]
+            found[option] = min(results[seed].best, found.get(option, float("inf")))
+        order = self._closing_order()
+        return sorted(order, key=lambda k: (found.get(k, float("inf")), order.index(k)))
+
+    def at_most(self, option: int) -> float:
+        """Share to which the box could be closed with a voxelization; 0 where no tree fits."""
+        if option not in self._at_most:
+            job = self._job(option, self._seeds(0).start)
+            closed = closed_at_most(job.problem) if isinstance(job, Job) else 0.0
+            self._at_most[option] = closed
+        return self._at_most[option]
+
+    def describe(self, candidate: Candidate) -> str:
+        """A tree in a few words: hinges, and how closed the box is and could be."""
+        text = f"{len(candidate.tree.hinges)} hinges, box closed to "
+        text += f"{100 * closed_share(candidate.tree):.0f} %"
+        option = self._option_of.get(candidate.seed)
+        if option is not None:
+            text += f" (at most {100 * self.at_most(option):.0f} %)"
+        return text
+
+    # For those who run several rounds at once ---------------------------------------------------
+
+    def batch(self, number: int) -> Batch:
+        """Seeds of a round that need none of each other's results."""
+        tasks = self._batch_tasks(number)
+        keys = {task.seed: task.key for task in tasks}
+        whole = {s: r for s, r in self._cache.known(keys).items() if r.cut is None}
+        return Batch(keys, whole)
+
+    def _batch_tasks(self, number: int) -> list[_Task]:
+        return [task for place in (0, 1) for task in self._tasks(number, place, {})]
+
+    def keep(self, event: Event, key: str) -> None:
+        """Keep what a seed of a batch found."""
+        self._cache.keep(event, key)
+
+    def job(self, number: int, seed: int) -> Job | SeedResult:
+        """What a seed of a batch searches, or its result where no tree can fit."""
+        return self._work(next(t for t in self._batch_tasks(number) if t.seed == seed))
 
     def voxels(self, seed: int) -> Voxels:
-        """The voxelization that a seed searches."""
-        return self.options[self._option(seed)]
+        """The voxelization that a seed searched."""
+        return self.options[self._option_of[seed]]
 
     def _paired(self, results: Mapping[int, SeedResult]) -> list[Found]:
         """Trees of all seeds that can be folded to the end, best first."""
@@ -312,38 +516,16 @@ class Rounds:
         first = self.recipe.seed * SEED_STRIDE + self._shift + number * SEEDS_PER_ROUND
         return range(first, first + SEEDS_PER_ROUND)
 
-    def _keys(self, number: int) -> dict[int, str]:
-        """Digest of all that each seed of a round depends on."""
-        recipe = self.recipe
-        about = [recipe.surface_weight, recipe.single_weight, recipe.effort, self._carves(number)]
-        about += wished(recipe)
-        return {seed: stage_key(self._key, *about, seed) for seed in self._seeds(number)}
-
-    def batch(self, number: int) -> Batch:
-        """The seeds of a round."""
-        keys = self._keys(number)
-        whole = {s: r for s, r in self._cache.known(keys).items() if r.cut is None}
-        return Batch(keys, whole)
-
-    def keep(self, event: Event, key: str) -> None:
-        """Keep what a seed of a batch found."""
-        self._cache.keep(event, key)
-
-    def job(self, seed: int) -> Job | SeedResult:
-        """What a seed searches, or its result where its voxelization rules every tree out."""
+    def _job(self, option: int, seed: int) -> Job | SeedResult:
+        """The problem of a voxelization, or the result where it rules every tree out."""
         if self.template.creases:
-            return self._job_of(seed)  # the faces of the parts depend on the seed
-        option = self._option(seed)
+            return self._job_of(option, seed)  # the faces of the parts depend on the seed
         if option not in self._jobs:
-            self._jobs[option] = self._job_of(seed)
-        job = self._jobs[option]
-        if isinstance(job, Job) and self._carves((seed - self._seeds(0)[0]) // SEEDS_PER_ROUND):
-            judge = LatticeFoldability(carve=CORE_HALF_SIDE, material=self.voxels(seed).subvoxels)
-            return replace(job, foldability=judge)
-        return job
+            self._jobs[option] = self._job_of(option, seed)
+        return self._jobs[option]
 
-    def _job_of(self, seed: int) -> Job | SeedResult:
-        voxels = self.voxels(seed)
+    def _job_of(self, option: int, seed: int) -> Job | SeedResult:
+        voxels = self.options[option]
         joints = features(voxels)
         protected = self.wishes.protected(voxels, joints, self.template)
         try:
@@ -362,7 +544,7 @@ class Rounds:
                 problem = restrict_to_parts(problem, seed, joints.depth)
         except NoTreeError as error:
             return SeedResult((), fits=False, why=str(error))
-        return Job(problem, LatticeFoldability(), EFFORTS[self.recipe.effort])
+        return Job(problem, LatticeFoldability(), Effort())
 
     def _carves(self, number: int) -> bool:
         """Whether cells may be cut in this round: where whole ones do not fold, every second one.
@@ -371,32 +553,12 @@ class Rounds:
         """
         return number % 2 == 1 and len(self.template) <= LARGE and not self.template.creases
 
-    def _round(self, number: int) -> list[Found]:
-        if number in self._done:
-            return self._done[number]
-        keys = self._keys(number)
-        results: Mapping[int, SeedResult] = {
-            seed: result for seed, result in self._cache.known(keys).items() if result.cut is None
-        }
-
-        def on_event(event: Event) -> None:
-            self._cache.keep(event, keys[event.seed])
-
-        if len(results) < len(keys):
-            with self._open_progress(f"fit-{number}") as progress:
-                results = search_tasks(
-                    {seed: self.job(seed) for seed in keys},
-                    workers=self.workers,
-                    scheduler=self.scheduler,
-                    progress=progress,
-                    known=results,
-                    on_event=on_event,
-                )
-        require_fit([results[seed] for seed in keys])
-        self._done[number] = self._paired(results)
-        return self._done[number]
-
     def closed(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Those that can be folded along the template's creases too, where it has any."""
         folded = (add_crease_hinges(candidate, self.template) for candidate in candidates)
         return [candidate for candidate in folded if candidate is not None]
+
+
+def _best(results: Mapping[int, SeedResult]) -> float:
+    """Least energy of all results; infinite where nothing folds."""
+    return min((result.best for result in results.values()), default=float("inf"))

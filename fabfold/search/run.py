@@ -213,6 +213,8 @@ class Tally:
         How far the search is, from 0 to 1, of the number of seeds that are done.
     total : int or None
         Seeds in all, where that is known.
+    describe : callable, optional
+        Tells a tree in a few words.
     """
 
     def __init__(
@@ -221,7 +223,9 @@ class Tally:
         known: Mapping[int, SeedResult],
         share: Callable[[int], float],
         total: int | None = None,
+        describe: Callable[[Candidate], str] | None = None,
     ) -> None:
+        self._describe = describe or _in_words
         self.results = dict(known)
         self.best = min(
             (c for result in known.values() for c in result.candidates),
@@ -244,13 +248,17 @@ class Tally:
                 self.best = candidate
         self.show()
 
+    def include(self, known: Mapping[int, SeedResult]) -> None:
+        """Count in seeds that are done already."""
+        for seed, result in known.items():
+            self.on_event(Done(seed, result))
+
     def show(self) -> None:
         """Show how far the search is, and its best tree."""
         done = len(self.results)
         text = f"{done} seeds" if self._total is None else f"{done} of {self._total} seeds"
         if self.best is not None:
-            text += f", best folding tree {len(self.best.tree.hinges)} hinges, "
-            text += f"energy {self.best.energy['total']:.2f}"
+            text += f", best folding tree {self._describe(self.best)}"
         self._progress.update(self._share(done), text)
 
     def check_failures(self) -> None:
@@ -267,6 +275,10 @@ class Tally:
                 f"every seed failed, {len(failed)} in all; the first: "
                 f"{self.results[min(failed)].why}. If memory is short, fewer --workers may do"
             )
+
+
+def _in_words(candidate: Candidate) -> str:
+    return f"{len(candidate.tree.hinges)} hinges, energy {candidate.energy['total']:.2f}"
 
 
 def search_tasks(

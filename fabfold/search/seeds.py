@@ -19,11 +19,24 @@ __all__ = ["Better", "Done", "Event", "Executor", "Job", "Lost", "SeedResult", "
 
 @dataclass(frozen=True)
 class Job:
-    """What all seeds of a round share; pickles."""
+    """What a seed searches; pickles.
+
+    Attributes
+    ----------
+    problem : TreeProblem
+        Voxels, joints and template as arrays.
+    foldability : Foldability
+        Tells which trees fold.
+    effort : Effort
+        How long it may try, in counts.
+    start : Candidate, optional
+        A tree of the problem that folds and is to be made better, instead of a new one.
+    """
 
     problem: TreeProblem
     foldability: Foldability
     effort: Effort
+    start: Candidate | None = None
 
 
 @dataclass(frozen=True)
@@ -138,7 +151,15 @@ def run_seed(
     fits, why, failed = True, "", False
     try:
         candidates = tuple(
-            solve(job.problem, seed, job.foldability, job.effort, report=report, stop=stopped)
+            solve(
+                job.problem,
+                seed,
+                job.foldability,
+                job.effort,
+                start=job.start,
+                report=report,
+                stop=stopped,
+            )
         )
     except NoFoldError as error:
         why = str(error)

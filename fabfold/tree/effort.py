@@ -25,6 +25,11 @@ class Effort:
         worth more.
     starts : int
         Starts made in any case, so that the best of several trees that fold is polished.
+    choices : int
+        Sets of poses grown for each start; the one of least energy is taken.
+    settling : int
+        Steps, per start, in which energy and hinges that cannot move go down together before the
+        planner is asked for the first time.
     removals : int
         Large-neighbourhood steps, per start, until hinges that can turn join all the clusters.
     closure_tests : int
@@ -35,6 +40,12 @@ class Effort:
         Sets of poses judged to lower the energy of each tree that folds.
     polish_best : int
         The same for the best of them, in phase B.
+    kicks : int
+        Most times that the best tree is shaken, settled and folded again.
+    kick_steps : int
+        Steps of settling after each kick.
+    kick_patience : int
+        Kicks in a row without a better tree after which no more are made.
     min_removed, max_removed : int
         Least and greatest number of voxels taken out at a time.
     repair_beam_width : int
@@ -46,7 +57,7 @@ class Effort:
     long_patience : int
         The same for the second run in phase A, made where the first leaves little unresolved.
     polish_patience : int
-        The same in phase B, along the steps of the tree that was changed.
+        The same in phase B, along the steps of the tree that was changed; there is no second run.
     near_miss : float
         Greatest share of unresolved quarter turns that counts as little.
     max_candidates : int
@@ -55,27 +66,32 @@ class Effort:
 
     beam_width: int = 10
     root_poses: int = 100
-    restarts: int = 12
-    starts: int = 20
-    removals: int = 30000
+    restarts: int = 3
+    starts: int = 2
+    choices: int = 3
+    settling: int = 1500
+    removals: int = 6000
     closure_tests: int = 8
     planner_runs: int = 1
-    polish_each: int = 400
-    polish_best: int = 4000
+    polish_each: int = 300
+    polish_best: int = 600
+    kicks: int = 0
+    kick_steps: int = 500
+    kick_patience: int = 4
     min_removed: int = 4
     max_removed: int = 16
     repair_beam_width: int = 6
     spanning_trees: int = 3
     short_patience: int = 40
     long_patience: int = 100
-    polish_patience: int = 400
+    polish_patience: int = 80
     near_miss: float = 0.12
     max_candidates: int = 5
 
 
-#: Effort by name, as the command line offers it.
+#: Effort by name: how long one seed may try.
 EFFORTS: dict[str, Effort] = {
-    "quick": Effort(root_poses=40, restarts=6, starts=1, polish_best=200),
-    "normal": Effort(),
-    "thorough": Effort(root_poses=400, restarts=60, starts=30, polish_best=20000),
+    "quick": Effort(root_poses=40, restarts=2, starts=1, polish_best=200),
+    "normal": Effort(restarts=2, starts=1),
+    "thorough": Effort(root_poses=400, restarts=6, starts=3, settling=4000, polish_each=800),
 }

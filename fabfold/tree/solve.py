@@ -1,8 +1,10 @@
 """Find joint trees that fold (paper section 4, with folding inside the search).
 
 :func:`solve` runs one seed. Simulated annealing over sets of poses lowers the energy, each step a
-large-neighbourhood move. Phase A adds a penalty for what does not fold yet, until a tree folds.
-Phase B anneals among trees that fold. Threshold acceptance with an exponential random number is the
+large-neighbourhood move. Of several sets of poses that were grown the best is the start. It settles
+first: energy and hinges that cannot move go down together, judged by the closure test alone, which
+costs little. Phase A asks the planner too, with a penalty for what does not fold yet, until a tree
+folds. Phase B anneals among trees that fold. Threshold acceptance with an exponential random number is the
 same as the Metropolis rule.
 """
 
@@ -16,12 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import NoFoldError, NoTreeError
+from fabfold.lattice.rotations import rotation_index
 from fabfold.tree.assembly import HingeChoice, SpanningTree, fold_tree, hinge_choice
 from fabfold.tree.candidate import Candidate
 from fabfold.tree.effort import Effort
+from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.foldability import Foldability, PlannerEstimate
 from fabfold.tree.initial_poses import grow
 from fabfold.tree.large_neighbourhood import ruin_and_recreate
+from fabfold.tree.leaf_assignment import reassign_leaves
 from fabfold.tree.pose_energy import energy_of
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.rng import generator
@@ -43,6 +48,8 @@ class Statistics:
         Those whose clusters hinges could join, so that phase A began.
     removals : int
         Large-neighbourhood steps.
+    assignments : int
+        Sets of leaves that took their best places at once.
     judged : int
         Sets of poses that were judged.
     trees : int
@@ -60,6 +67,7 @@ class Statistics:
     grown: int = 0
     starts: int = 0
     removals: int = 0
+    assignments: int = 0
     judged: int = 0
     trees: int = 0
     closed: int = 0
@@ -125,6 +133,15 @@ class _FoldingObjective:
 
 #: Share of steps of phase A that start from the hinges in trouble.
 _FOCUSED = 0.5
+#: Share of steps that move leaves to their best places, and how many at most. The others take a
+#: part out and put it back.
+_LEAF_STEPS, _MOST_LEAVES, _LEAF_TRIES = 0.35, 12, 20
+#: First and last temperature while poses settle; the first one after a kick.
+_SETTLE_HOT, _SETTLE_COLD, _KICK_HOT = 0.5, 0.12, 0.2
+#: Energy by which a tree must be better to count as better.
+_GAIN = 1e-6
+#: First and last temperature of phase B: of each tree that folds, and of the best.
+_POLISH_EACH, _POLISH_BEST = (0.1, 0.02), (0.05, 0.005)
 #: Share of steps of phase A that draw other trees for the same poses.
 _SAME_POSES = 0.05
 #: Energy of a piece that no hinge joins, while poses are made joinable and after.
@@ -137,6 +154,17 @@ def _folding_objective(voxels: int) -> _FoldingObjective:
     if voxels <= 72:
         return _FoldingObjective(stuck_hinge=0.15, energy=1.0, joint=0.1, hot=0.15, cold=0.02)
     return _FoldingObjective(stuck_hinge=1.0, energy=0.2, joint=0.1, hot=0.1, cold=0.01)
+
+
+def _steps_of_path(tree: FoldTree, path: NDArray[np.int32]) -> NDArray[np.int32]:
+    """The moves of a path as steps that guide the planner, (g, 5)."""
+    steps: list[tuple[int, int, int, int, int]] = []
+    for number, quarters in path.tolist():
+        hinge = tree.hinges[number]
+        x, y, z = (round(2 * value) for value in hinge.point)
+        way = 1 if quarters * hinge.angle_deg > 0 else -1
+        steps += [(x, y, z, int(np.flatnonzero(hinge.direction)[0]), way)] * abs(quarters)
+    return np.array(steps, np.int32).reshape(-1, 5)
 
 
 class _Search:
@@ -179,16 +207,26 @@ class _Search:
         tries: int,
         piece_penalty: float,
         focus: NDArray[np.int32] = _ANYWHERE,
+        heat: float = 0.0,
     ) -> tuple[NDArray[np.int32], float, int] | None:
         """Other poses with energy, and penalty for loose pieces, of at most `threshold`.
+
+        At a temperature `heat` above 0, some steps move leaves to their best places.
 
         Returns
         -------
         (pose, energy, loose pieces) or None
-            None where no removal led to such poses.
+            None where no step led to such poses.
         """
         effort = self.effort
         out = np.empty(len(pose), np.int32)
+        if heat > 0 and self.tables.max_shared == 0 and self.rng.random() < _LEAF_STEPS:
+            used, energy, left = reassign_leaves(
+                self.tables, pose, self.problem.empty_face, hinge_tables(), piece_penalty,
+                threshold, _LEAF_TRIES, _MOST_LEAVES, heat, self.generator, out,
+            )  # fmt: skip
+            self.statistics.assignments += used
+            return None if math.isinf(energy) else (out, energy, left)
         used, energy, left = ruin_and_recreate(
             self.tables, pose, self.problem.empty_face, hinge_tables(), piece_penalty, threshold,
             focus, tries, effort.min_removed, min(effort.max_removed, len(pose)),
@@ -237,31 +275,36 @@ class _Search:
     def planner_estimate(
         self, tree: SpanningTree, guide: NDArray[np.int32] | None, polishing: bool
     ) -> PlannerEstimate:
-        """What the planner leaves of a tree; it runs again where that is little.
+        """What the planner leaves of a tree; before anything folds it runs again if that is little.
 
-        A tree that folds is changed a little at a time, so a long run along its steps finds most
-        that there is to find. Before anything folds, a run without them does more.
+        A tree that folds is changed a little at a time, so one run along its steps finds most that
+        there is to find. Before anything folds, a run without them does more.
         """
         effort = self.effort
         self.statistics.planner_runs += 1
+        if polishing:
+            return self.judge.estimate(tree.system, effort.polish_patience, guide)
         found = self.judge.estimate(tree.system, effort.short_patience, guide)
         left = found.unresolved.sum()
         if 0 < left <= effort.near_miss * 2 * len(found.unresolved):
             self.statistics.second_runs += 1
-            if polishing:
-                other = self.judge.estimate(tree.system, effort.polish_patience, guide)
-            else:
-                other = self.judge.estimate(tree.system, effort.long_patience)
+            other = self.judge.estimate(tree.system, effort.long_patience)
             if other.unresolved.sum() < left:
                 return other
         return found
 
     def judged(
-        self, pose: NDArray[np.int32], energy: float, before: _State | None, bound: float
+        self,
+        pose: NDArray[np.int32],
+        energy: float,
+        before: _State | None,
+        bound: float,
+        plan: bool = True,
     ) -> _State | None:
         """The best spanning tree for these poses, or None where its penalty exceeds `bound`.
 
-        Hinges and steps are kept from the state `before` where that is possible.
+        Hinges and steps are kept from the state `before` where that is possible. Without `plan`
+        the closure test judges alone.
         """
         choice = hinge_choice(self.problem, pose)
         self.statistics.judged += 1
@@ -275,8 +318,8 @@ class _Search:
             penalty = self.objective.stuck_hinge * float(stuck.sum())
             trouble = stuck.any(axis=0)
             steps = guide
-            if penalty == 0:
-                self.statistics.closed += 1
+            self.statistics.closed += penalty == 0
+            if penalty == 0 and plan:
                 found = self.planner_estimate(tree, guide, bound == 0.0)
                 trouble = found.unresolved > 0
                 left = float(found.unresolved.sum())
@@ -292,6 +335,51 @@ class _Search:
         return best
 
     # --- phases ----------------------------------------------------------------------------
+
+    def starts(self) -> Iterator[_State]:
+        """Joinable poses to start from: of each `choices` that were grown the best."""
+        effort, statistics = self.effort, self.statistics
+        best: _State | None = None
+        tried = 0
+        for pose in grow(
+            self.problem,
+            self.seed,
+            beam_width=effort.beam_width,
+            root_poses=effort.root_poses,
+            stop=self.stopped,
+        ):
+            statistics.grown += 1
+            tried += 1
+            self.tables = self.phase_a_tables
+            start = self.make_joinable(pose)
+            if start is not None:
+                energy, _ = energy_of(self.tables, start.pose, self.problem.empty_face)
+                if best is None or energy < best.energy:
+                    best = replace(start, energy=energy)
+            if best is not None and tried >= effort.choices:
+                yield best
+                best, tried = None, 0
+        if best is not None:
+            yield best
+
+    def settle(self, start: _State, steps: int, hot: float) -> _State | None:
+        """Lower energy and stuck hinges together, by the closure test alone."""
+        weight = self.objective.energy
+        now = self.judged(start.pose, start.energy, None, math.inf, plan=False)
+        if now is None:
+            return None
+        for step in range(steps):
+            if self.stopped():
+                break
+            heat = hot * (_SETTLE_COLD / hot) ** (step / steps)
+            value = weight * now.energy + now.penalty + heat * self.rng.exponential()
+            stuck = len(now.focus) > 0 and self.rng.random() < _FOCUSED
+            focus = now.focus if stuck else _ANYWHERE
+            found = self.neighbour(now.pose, value / weight, 20, _PIECE, focus, heat)
+            if found is not None:
+                bound = value - weight * found[1]
+                now = self.judged(found[0], found[1], now, bound, plan=False) or now
+        return now
 
     def fold(self, start: _State) -> _State | None:
         """Phase A: trade energy for foldability until a tree folds."""
@@ -313,7 +401,7 @@ class _Search:
                 pose, energy = now.pose, now.energy
             else:
                 focus = now.focus if self.rng.random() < _FOCUSED else _ANYWHERE
-                found = self.neighbour(now.pose, value / objective.energy, 20, _PIECE, focus)
+                found = self.neighbour(now.pose, value / objective.energy, 20, _PIECE, focus, heat)
                 if found is None:
                     tests += 1
                     continue
@@ -335,7 +423,7 @@ class _Search:
                 break
             heat = hot * (cold / hot) ** (step / steps)
             value = now.energy + heat * self.rng.exponential()
-            found = self.neighbour(now.pose, value, 20, _PIECE)
+            found = self.neighbour(now.pose, value, 20, _PIECE, heat=heat)
             if found is None:
                 continue
             fresh = self.judged(found[0], found[1], now, 0.0)
@@ -365,33 +453,75 @@ class _Search:
             return None
         return Candidate(fold_tree(self.problem, state.pose, state.tree), path, self.seed)
 
+    def settled_and_folded(self, start: _State, steps: int, hot: float) -> _State | None:
+        """A tree that folds, settled from a start and polished for a moment; None for none."""
+        self.tables = self.phase_a_tables
+        settled = self.settle(start, steps, hot) if steps else start
+        folded = None if settled is None else self.fold(settled)
+        self.tables = self.problem.tables
+        if folded is None:
+            return None
+        energy, _ = energy_of(self.tables, folded.pose, self.problem.empty_face)
+        folded = replace(folded, energy=energy)
+        self.keep(folded)
+        return self.polish(folded, self.effort.polish_each, *_POLISH_EACH)
+
+    def improve(self, state: _State) -> None:
+        """Polish a tree that folds; then shake, settle and fold it again until that no longer pays.
+
+        An iterated local search (Lourenço, Martin and Stützle 2003).
+        """
+        effort = self.effort
+        now = self.polish(state, effort.polish_best, *_POLISH_BEST)
+        idle = 0
+        for _ in range(effort.kicks):
+            if idle >= effort.kick_patience or self.stopped():
+                break
+            found = self.settled_and_folded(now, effort.kick_steps, _KICK_HOT)
+            idle += 1
+            if found is not None and found.energy < now.energy - _GAIN:
+                now, idle = found, 0
+
     def folding_states(self) -> list[_State]:
         """Trees that fold, from several starts, each polished for a moment."""
         effort, statistics = self.effort, self.statistics
         found: list[_State] = []
-        for pose in grow(
-            self.problem,
-            self.seed,
-            beam_width=effort.beam_width,
-            root_poses=effort.root_poses,
-            stop=self.stopped,
-        ):
-            statistics.grown += 1
-            self.tables = self.phase_a_tables
-            start = self.make_joinable(pose)
-            if start is not None:
-                statistics.starts += 1
-                folded = self.fold(start)
-                if folded is not None:
-                    self.tables = self.problem.tables
-                    energy, _ = energy_of(self.tables, folded.pose, self.problem.empty_face)
-                    folded = replace(folded, energy=energy)
-                    self.keep(folded)
-                    found.append(self.polish(folded, effort.polish_each, 0.1, 0.02))
+        for start in self.starts():
+            statistics.starts += 1
+            folded = self.settled_and_folded(start, effort.settling, _SETTLE_HOT)
+            if folded is not None:
+                found.append(folded)
             enough = effort.starts if found else effort.restarts
             if statistics.starts >= enough or self.stopped():
                 break
         return found
+
+    def state_of(self, candidate: Candidate) -> _State | None:
+        """A tree that folds as a state; None where the planner does not fold it again."""
+        tree, problem = candidate.tree, self.problem
+        number = {tuple(cell): k for k, cell in enumerate(problem.template.cells.tolist())}
+        cells = np.array([number[tuple(cell)] for cell in tree.target.tolist()], np.int32)
+        turns = np.array([rotation_index(matrix) for matrix in tree.orientation], np.int32)
+        pose = 24 * cells + turns
+        energy, _ = energy_of(self.tables, pose, problem.empty_face)
+        choice = hinge_choice(problem, pose)
+        hinged = {(edge.parent, edge.child) for edge in tree.edges if edge.kind != "R"}
+        guide = _steps_of_path(tree, candidate.path)
+        for drawn in self.trees(choice, {(min(pair), max(pair)) for pair in hinged}, 3):
+            found = self.judge.estimate(drawn.system, self.effort.long_patience, guide)
+            if not found.unresolved.any():
+                return _State(pose, energy, drawn, 0.0, guide=found.guide)
+        return None
+
+    def go_on(self, start: Candidate) -> list[Candidate]:
+        """Phase B alone, from a tree that folds; that tree is among the results."""
+        self.tables = self.problem.tables
+        state = self.state_of(start)
+        if state is not None:
+            self.results.append(state)
+            self.improve(state)
+        found = [c for c in self.finished() if c.energy["total"] < start.energy["total"] - 1e-9]
+        return [*found, replace(start, seed=self.seed)][: self.effort.max_candidates]
 
     def run(self) -> list[Candidate]:
         """All the phases."""
@@ -399,7 +529,7 @@ class _Search:
         found = self.folding_states()
         if found:
             self.tables = self.problem.tables
-            self.polish(min(found, key=lambda s: s.energy), effort.polish_best, 0.05, 0.005)
+            self.improve(min(found, key=lambda s: s.energy))
         if self.statistics.grown == 0:
             raise NoTreeError(
                 f"no tree found for {len(self.problem)} voxels in template "
@@ -445,6 +575,7 @@ def solve(
     statistics: Statistics | None = None,
     report: Callable[[Candidate], None] | None = None,
     stop: Callable[[], bool] | None = None,
+    start: Candidate | None = None,
 ) -> list[Candidate]:
     """Trees of rigid joints and hinges that fold, best first.
 
@@ -470,6 +601,9 @@ def solve(
         Asked at every step; the search ends with what it has once it says True. The result
         then depends on when it does.
 
+    start : Candidate, optional
+        A tree of the problem that folds: it is made better, and no other is grown.
+
     Returns
     -------
     list of Candidate
@@ -491,4 +625,4 @@ def solve(
         report,
         stop,
     )
-    return search.run()
+    return search.run() if start is None else search.go_on(start)

@@ -1,0 +1,91 @@
+"""The schedule of a round: which voxelizations are searched, how long, and what goes on.
+
+A round is successive halving (Jamieson and Talwalkar 2016). Its first seed takes the roomiest
+voxelization, whose tree is there at once and is the guarantee. Then several seeds search the
+voxelizations that could close the box best, each for a short while, and more seeds those on which
+the best trees were found. The best trees are then changed further, until that no longer pays. All
+budgets are counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from fabfold.tree.effort import EFFORTS, Effort
+
+__all__ = ["SEEDS_PER_ROUND", "Rung", "schedule"]
+
+#: Numbers that a round keeps for its seeds; a constant, so that rounds of any effort keep theirs.
+SEEDS_PER_ROUND = 100
+#: Least gain in energy, over a rung of polishing, for which another one follows.
+GAIN = 0.02
+
+
+@dataclass(frozen=True)
+class Rung:
+    """Seeds of a round that run side by side.
+
+    Attributes
+    ----------
+    takes : str
+        ``"roomy"``: voxelizations from the fewest voxels on. ``"closing"``: those that could close
+        the box best, best first. ``"promising"``: those of the best trees so far. ``"best"``: the
+        best trees so far, of different seeds.
+    seeds : int
+        How many.
+    effort : Effort
+        How long each may try.
+    options : int
+        Voxelizations that the seeds share.
+    """
+
+    takes: Literal["roomy", "closing", "promising", "best"]
+    seeds: int
+    effort: Effort
+    options: int = 1
+
+
+def _rungs(
+    effort: Effort, closing: int, promising: tuple[int, int], best: tuple[tuple[int, int], ...]
+) -> tuple[Rung, ...]:
+    """Rungs from seeds, one a voxelization; seeds and voxelizations; seeds and kicks."""
+    first = replace(
+        effort, restarts=12, starts=1, choices=1, settling=0, polish_each=100, polish_best=0
+    )
+    search = replace(effort, polish_best=0)
+    return (
+        Rung("roomy", 1, first),
+        Rung("closing", closing, search, closing),
+        Rung("promising", promising[0], search, promising[1]),
+        *(Rung("best", seeds, replace(effort, kicks=kicks)) for seeds, kicks in best),
+    )
+
+
+_SCHEDULES: dict[str, tuple[Rung, ...]] = {
+    "quick": _rungs(EFFORTS["quick"], 4, (2, 1), ((2, 3),)),
+    "normal": _rungs(EFFORTS["normal"], 4, (4, 2), ((3, 6), (2, 8), (2, 8))),
+    "thorough": _rungs(EFFORTS["thorough"], 8, (16, 3), ((6, 20), (4, 40), (4, 40), (4, 40))),
+}
+
+
+def schedule(effort: str, number: int) -> tuple[Rung, ...]:
+    """Rungs of a round.
+
+    Parameters
+    ----------
+    effort : str
+        ``quick``, ``normal`` or ``thorough``.
+    number : int
+        Of the round, from 0. Rounds after the first follow where nothing folded: they try more
+        roomy voxelizations before the others.
+
+    Returns
+    -------
+    tuple of Rung
+        In the order in which they run.
+    """
+    first, *others = _SCHEDULES[effort]
+    if number == 0:
+        return (first, *others)
+    return (replace(first, seeds=4, options=4), *others)
