@@ -37,7 +37,7 @@ def asked(model: str, template: str, wanted: int, seed: int) -> list[Any]:
     from fabfold.lattice.shipped import load_template
     from fabfold.recipe.recipe_wishes import default_weights
     from fabfold.samples.builtin import load_model
-    from fabfold.search.rounds import search_order
+    from fabfold.search.voxelization_problems import search_order
     from fabfold.tree.effort import Effort
     from fabfold.tree.problem import from_features
     from fabfold.tree.solve import Statistics, solve

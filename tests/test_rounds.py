@@ -12,6 +12,8 @@ from fabfold.files import write_json
 from fabfold.kit.kit import Kit, open_kit
 from fabfold.search.rounds import SEED_STRIDE
 from fabfold.search.run import Budget
+from fabfold.search.schedule import SEEDS_PER_ROUND, schedule
+from fabfold.tree.bound import closed_share
 from fabfold.tree.kinematics_check import check_tree
 
 
@@ -135,14 +137,13 @@ def test_more_time_goes_on_and_the_same_time_does_not_repeat(bar_kit, monkeypatc
     more = open_kit(str(tmp_path / "searched"), workers=1, seconds=60)
     best = more.fit()[0]
     first = SEED_STRIDE * bar_kit.recipe.seed
-    done = {first + k for k in range(len(before))}
-    assert not done & set(ran), "seeds that ran to their end are not run again"
-    assert min(ran) == max(done) + 1
+    assert len(before) > 4
+    assert min(ran) == first + SEEDS_PER_ROUND, "rounds that ran to their end are not run again"
     energies = [c["tree"]["energy"]["total"] for seed in before for c in seed["candidates"]]
     np.testing.assert_allclose(best.energy["total"], min(energies))
 
 
-def test_seeds_take_voxelizations_in_turn_from_roomy_to_full(tmp_path):
+def test_a_round_looks_at_roomy_voxelizations_first_and_goes_on_where_it_pays(tmp_path):
     path = tmp_path / "block.stl"
     trimesh.creation.box((60.0, 40.0, 20.0)).export(path)
     kit = Kit.from_model(path, template="box-3x3x3", effort="quick", seed=3, workers=1)
@@ -150,13 +151,21 @@ def test_seeds_take_voxelizations_in_turn_from_roomy_to_full(tmp_path):
     assert len(set(sizes)) > 1
     rounds = kit._rounds()
     first = SEED_STRIDE * kit.recipe.seed
-    turns = [len(rounds.voxels(first + k)) for k in range(2 * len(sizes))]
-    assert sorted(turns[: len(sizes)]) == sorted(sizes), "each comes once before any comes again"
-    assert turns[: len(sizes)] == turns[len(sizes) :]
-    assert turns[0] == min(sizes)
-    half = (len(sizes) + 1) // 2
-    assert turns[:half] == sorted(turns[:half])
-    # What a seed finds joins the voxels that it was given.
-    for voxels, candidate in next(rounds.found()):
+    found = next(rounds.found())
+    assert len(rounds.voxels(first)) == min(sizes)
+    roomy, closing, *_ = schedule("quick", 0)
+    order = rounds.problems.closing_order()
+    most = [rounds.problems.at_most(option) for option in order]
+    assert most == sorted(most, reverse=True)
+    for k in range(closing.seeds):
+        voxels = rounds.voxels(first + roomy.seeds + k)
+        assert voxels is rounds.problems.options[order[k % min(closing.options, len(order))]]
+    # What a seed finds joins the voxels that it was given, and no box is closed further than the
+    # bound of its voxels.
+    for voxels, candidate in found:
         assert voxels is rounds.voxels(candidate.seed)
         assert np.array_equal(candidate.tree.source, voxels.cells)
+        option = rounds.problems.options.index(voxels)
+        assert closed_share(candidate.tree) <= rounds.problems.at_most(option) + 1e-9
+    energies = [candidate.energy["total"] for _, candidate in found]
+    assert energies == sorted(energies)

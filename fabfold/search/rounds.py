@@ -7,80 +7,33 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fabfold.errors import NoFoldError, NoTreeError, RecipeError
+from fabfold.errors import NoFoldError, NoTreeError
 from fabfold.fold.core_sweep import CORE_HALF_SIDE
 from fabfold.fold.crease_hinges import add_crease_hinges
 from fabfold.fold.lattice_foldability import LatticeFoldability
 from fabfold.lattice.template import Template
 from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
-from fabfold.recipe.recipe_wishes import weights_of, wished
+from fabfold.recipe.recipe_wishes import wished
 from fabfold.search.run import Budget, Tally, executor, require_fit, run_seeds, warm_up
 from fabfold.search.saved import SeedCache
 from fabfold.search.schedule import GAIN, SEEDS_PER_ROUND, Rung, schedule
 from fabfold.search.seeds import Event, Executor, Job, SeedResult
+from fabfold.search.voxelization_problems import VoxelizationProblems
 from fabfold.store import StageStore, stage_key
-from fabfold.tree.bound import closed_at_most, closed_share
+from fabfold.tree.bound import closed_share
 from fabfold.tree.candidate import Candidate
 from fabfold.tree.effort import Effort
-from fabfold.tree.problem import from_features
-from fabfold.tree.template_parts import restrict_to_parts
-from fabfold.voxels.features import features
 from fabfold.voxels.voxel_model import Voxels
-from fabfold.wishes.protect import rank_by_cuts, rigid_pairs
 from fabfold.wishes.wish_list import Wishes
 
-__all__ = ["Rounds", "search_order"]
+__all__ = ["Rounds"]
 
 #: Templates of more cells are large: near misses are locked by more than corners.
 LARGE = 72
 #: Distance of the search's first seeds for recipe seeds that follow each other: more than
 #: any recipe's rounds use, so that two recipes share none.
 SEED_STRIDE = 1_000_000
-
-
-def search_order(options: Sequence[Voxels]) -> list[Voxels]:
-    """Order in which seeds take voxelizations: from the fewest voxels to the most, and again.
-
-    What leaves much of the template free folds within seconds; what fills it better has to beat
-    that. Of each two neighbours in size one comes in the first turn, the other in the second.
-    """
-    ordered = sorted(options, key=len)
-    return ordered[0::2] + ordered[1::2]
-
-
-def _usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> list[Voxels]:
-    """Voxelizations in which the wishes can come true, in their order of search.
-
-    Raises
-    ------
-    NoTreeError
-        If there is none.
-    RecipeError
-        If the template does not go with the wishes.
-    """
-    if template.creases and (wishes.keeps or wishes.void):
-        raise RecipeError(
-            f"template {template.name!r} folds once more when it is filled: --keep and --void, "
-            "which speak of the sides of the filled template, do not go with it"
-        )
-    if template.joints == "inside":
-        # The last hinge to turn brings two halves together. With all four cells around its edge
-        # full, a quarter turn before the end some of them would have been in one another.
-        roomy = [voxels for voxels in options if len(voxels) < len(template)]
-        if not roomy:
-            raise NoTreeError(
-                f"joints inside: every voxelization fills all {len(template)} cells of template "
-                f"{template.name!r}, and the last hinge to turn needs an empty cell beside it; "
-                "take a template with a few more cells, a larger --drop-below, or allow hinges "
-                "on the surface"
-            )
-        options = roomy
-    ordered = search_order(options)
-    if wishes.regions:
-        found = [(voxels, features(voxels)) for voxels in ordered]
-        ordered = [ordered[index] for index in rank_by_cuts(wishes.regions, found, template)]
-    return ordered
 
 
 #: A tree that folds, and the voxels that it joins.
@@ -105,7 +58,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class _Task:
-    """One seed: its number, digest, voxelization, round, effort, and the tree that it goes on from."""
+    """One seed: its number, digest, voxelization, round, effort, and the tree to go on from."""
 
     seed: int
     key: str
@@ -166,7 +119,7 @@ class Rounds:
         self.recipe = recipe
         self.template = template
         self.wishes = wishes or Wishes()
-        self.options = _usable(options, template, self.wishes)
+        self.problems = VoxelizationProblems(recipe, template, options, self.wishes)
         self._shift = shift
         self.workers = workers
         self.scheduler = scheduler
@@ -175,11 +128,8 @@ class Rounds:
         self._cache = SeedCache(store)
         self._open_progress = open_progress
         self._on_first = on_first
-        self._jobs: dict[int, Job | SeedResult] = {}
         self._option_of: dict[int, int] = {}
         self._origin: dict[int, int] = {}
-        self._at_most: dict[int, float] = {}
-        self._closing: list[int] | None = None
         self._done: dict[int, list[Found]] = {}
         self._ranked: list[Found] | None = None
 
@@ -214,7 +164,8 @@ class Rounds:
             raise NoTreeError(why)
         if not found:
             raise NoFoldError(
-                f"no tree that folds in {self.recipe.rounds} rounds of the search; try --effort thorough, more --rounds, another --seed or a larger template"
+                f"no tree that folds in {self.recipe.rounds} rounds of the search; try "
+                "--effort thorough, more --rounds, another --seed or a larger template"
                 + self._about_wishes()
             )
 
@@ -283,8 +234,7 @@ class Rounds:
 
     def _searchable(self, results: Mapping[int, SeedResult]) -> bool:
         """Whether any voxelization that was looked at can be searched at all."""
-        jobs = any(isinstance(job, Job) for job in self._jobs.values())
-        return jobs or any(result.fits for result in results.values())
+        return any(result.fits for result in results.values())
 
     def _round(self, number: int) -> list[Found]:
         """Trees that a round finds, each seed run to its end."""
@@ -389,16 +339,24 @@ class Rounds:
                 self._task(number, seed, self._option_of[start.seed], rung.effort, start)
                 for seed, start in zip(seeds, self._starts(results), strict=False)
             ]
-        order = list(range(len(self.options)))
+        order = list(range(len(self.problems.options)))
         if rung.takes == "closing":
-            order = self._closing_order()
+            order = self.problems.closing_order()
         elif rung.takes == "promising":
-            order = self._promising_order(results)
+            order = self.problems.promising_order(self._best_by_option(results))
         order = order[: rung.options]
         return [
             self._task(number, seed, order[k % len(order)], rung.effort)
             for k, seed in enumerate(seeds)
         ]
+
+    def _best_by_option(self, results: Mapping[int, SeedResult]) -> dict[int, float]:
+        """Least energy found on each voxelization; infinite where nothing folds."""
+        found: dict[int, float] = {}
+        for seed in sorted(results):
+            option = self._option_of[seed]
+            found[option] = min(results[seed].best, found.get(option, float("inf")))
+        return found
 
     def _starts(self, results: Mapping[int, SeedResult]) -> list[Candidate]:
         """The best tree of each seed, and of the seeds that went on from it, best first."""
@@ -432,43 +390,14 @@ class Rounds:
 
     def _work(self, task: _Task) -> Job | SeedResult:
         """What a seed searches, or its result where its voxelization rules every tree out."""
-        job = self._job(task.option, task.seed)
+        job = self.problems.job(task.option, task.seed)
         if isinstance(job, SeedResult):
             return job
         if self._carves(task.number):
-            material = self.options[task.option].subvoxels
+            material = self.problems.options[task.option].subvoxels
             judge = LatticeFoldability(carve=CORE_HALF_SIDE, material=material)
             job = replace(job, foldability=judge)
         return replace(job, effort=task.effort, start=task.start)
-
-    def _closing_order(self) -> list[int]:
-        """Voxelizations by how closed the box could be, most first; by cuts with --protect."""
-        if self._closing is None:
-            order = range(len(self.options))
-            if self.wishes.regions:
-                self._closing = list(order)
-            else:
-                most = [self.at_most(option) for option in order]
-                # Of equals the fuller one.
-                self._closing = sorted(order, key=lambda k: (-most[k], -len(self.options[k])))
-        return self._closing
-
-    def _promising_order(self, results: Mapping[int, SeedResult]) -> list[int]:
-        """Voxelizations by the best tree found on each, and what nothing was found on after."""
-        found: dict[int, float] = {}
-        for seed in sorted(results):
-            option = self._option_of[seed]
-            found[option] = min(results[seed].best, found.get(option, float("inf")))
-        order = self._closing_order()
-        return sorted(order, key=lambda k: (found.get(k, float("inf")), order.index(k)))
-
-    def at_most(self, option: int) -> float:
-        """Share to which the box could be closed with a voxelization; 0 where no tree fits."""
-        if option not in self._at_most:
-            job = self._job(option, self._seeds(0).start)
-            closed = closed_at_most(job.problem) if isinstance(job, Job) else 0.0
-            self._at_most[option] = closed
-        return self._at_most[option]
 
     def describe(self, candidate: Candidate) -> str:
         """A tree in a few words: hinges, and how closed the box is and could be."""
@@ -476,7 +405,7 @@ class Rounds:
         text += f"{100 * closed_share(candidate.tree):.0f} %"
         option = self._option_of.get(candidate.seed)
         if option is not None:
-            text += f" (at most {100 * self.at_most(option):.0f} %)"
+            text += f" (at most {100 * self.problems.at_most(option):.0f} %)"
         return text
 
     # For those who run several rounds at once ---------------------------------------------------
@@ -501,7 +430,7 @@ class Rounds:
 
     def voxels(self, seed: int) -> Voxels:
         """The voxelization that a seed searched."""
-        return self.options[self._option_of[seed]]
+        return self.problems.options[self._option_of[seed]]
 
     def _paired(self, results: Mapping[int, SeedResult]) -> list[Found]:
         """Trees of all seeds that can be folded to the end, best first."""
@@ -515,36 +444,6 @@ class Rounds:
     def _seeds(self, number: int) -> range:
         first = self.recipe.seed * SEED_STRIDE + self._shift + number * SEEDS_PER_ROUND
         return range(first, first + SEEDS_PER_ROUND)
-
-    def _job(self, option: int, seed: int) -> Job | SeedResult:
-        """The problem of a voxelization, or the result where it rules every tree out."""
-        if self.template.creases:
-            return self._job_of(option, seed)  # the faces of the parts depend on the seed
-        if option not in self._jobs:
-            self._jobs[option] = self._job_of(option, seed)
-        return self._jobs[option]
-
-    def _job_of(self, option: int, seed: int) -> Job | SeedResult:
-        voxels = self.options[option]
-        joints = features(voxels)
-        protected = self.wishes.protected(voxels, joints, self.template)
-        try:
-            problem = from_features(
-                voxels,
-                joints,
-                self.template,
-                weights_of(self.recipe),
-                extra_cost=self.wishes.extra_cost(voxels, self.template),
-                always_rigid=rigid_pairs(protected, joints),
-                joints=self.recipe.joints,
-                share=self.recipe.share,
-            )
-            problem = self.wishes.with_roots(problem, voxels, self.template)
-            if self.template.creases:
-                problem = restrict_to_parts(problem, seed, joints.depth)
-        except NoTreeError as error:
-            return SeedResult((), fits=False, why=str(error))
-        return Job(problem, LatticeFoldability(), Effort())
 
     def _carves(self, number: int) -> bool:
         """Whether cells may be cut in this round: where whole ones do not fold, every second one.

@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -134,6 +135,41 @@ class HingeChoice:
             octants=None if self.octants is None else unpacked(self.octants),
         )
         return SpanningTree(system, joints)
+
+    def trees(
+        self, kept_pairs: set[tuple[int, int]], count: int, generator: NDArray[np.uint64]
+    ) -> Iterator[SpanningTree]:
+        """Different random spanning trees; the first ones keep most hinges of `kept_pairs`.
+
+        Parameters
+        ----------
+        kept_pairs : set of (int, int)
+            Pairs of voxels, the smaller number first.
+        count : int
+            Most trees drawn.
+        generator : (1,) uint64 array
+            Random state, advanced.
+
+        Yields
+        ------
+        SpanningTree
+            None of them twice.
+        """
+        seen: set[frozenset[tuple[int, int]]] = set()
+        kept = self.preference(kept_pairs, 1.0)
+        for k in range(count):
+            bonus = (2.0, 0.7, 0.0)[min(k, 2)]
+            for _ in range(8):
+                # Hinges on one lattice edge exclude each other, so a random choice may not span.
+                tree = self.tree(bonus * kept, generator)
+                if tree is not None:
+                    break
+            else:
+                continue
+            pairs = frozenset(tree.hinged_pairs)
+            if pairs not in seen:
+                seen.add(pairs)
+                yield tree
 
 
 def hinge_choice(problem: TreeProblem, pose: NDArray[np.int32]) -> HingeChoice:

@@ -4,25 +4,24 @@
 large-neighbourhood move. Of several sets of poses that were grown the best is the start. It settles
 first: energy and hinges that cannot move go down together, judged by the closure test alone, which
 costs little. Phase A asks the planner too, with a penalty for what does not fold yet, until a tree
-folds. Phase B anneals among trees that fold. Threshold acceptance with an exponential random number is the
-same as the Metropolis rule.
+folds. Phase B anneals among trees that fold; then the best one is shaken, settles and folds again,
+until that no longer pays. Threshold acceptance with an exponential random number is the same as
+the Metropolis rule.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import NoFoldError, NoTreeError
-from fabfold.lattice.rotations import rotation_index
-from fabfold.tree.assembly import HingeChoice, SpanningTree, fold_tree, hinge_choice
+from fabfold.tree.assembly import SpanningTree, fold_tree, hinge_choice
 from fabfold.tree.candidate import Candidate
 from fabfold.tree.effort import Effort
-from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.foldability import Foldability, PlannerEstimate
 from fabfold.tree.initial_poses import grow
 from fabfold.tree.large_neighbourhood import ruin_and_recreate
@@ -30,105 +29,18 @@ from fabfold.tree.leaf_assignment import reassign_leaves
 from fabfold.tree.pose_energy import energy_of
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.rng import generator
+from fabfold.tree.search_state import (
+    ANYWHERE,
+    SearchState,
+    Statistics,
+    folding_objective,
+    pose_of_tree,
+    steps_of_path,
+)
 from fabfold.tree.spanning_trees import loose_pieces
 from fabfold.tree.swept_cells import hinge_tables
 
 __all__ = ["Statistics", "solve"]
-
-
-@dataclass
-class Statistics:
-    """What one run did, in counts.
-
-    Attributes
-    ----------
-    grown : int
-        Full sets of poses grown.
-    starts : int
-        Those whose clusters hinges could join, so that phase A began.
-    removals : int
-        Large-neighbourhood steps.
-    assignments : int
-        Sets of leaves that took their best places at once.
-    judged : int
-        Sets of poses that were judged.
-    trees : int
-        Spanning trees drawn for them.
-    closed : int
-        Spanning trees that passed the closure test.
-    planner_runs : int
-        Trees that the planner was asked about.
-    second_runs : int
-        Those that it was asked about again, with more patience.
-    folded : int
-        Steps of phase B that led to a tree that folds.
-    """
-
-    grown: int = 0
-    starts: int = 0
-    removals: int = 0
-    assignments: int = 0
-    judged: int = 0
-    trees: int = 0
-    closed: int = 0
-    planner_runs: int = 0
-    second_runs: int = 0
-    folded: int = 0
-
-
-#: No voxel in particular to start a removal from.
-_ANYWHERE = np.empty(0, np.int32)
-
-
-@dataclass(frozen=True)
-class _State:
-    """Full poses, their hinges, and what the objective says of them.
-
-    Attributes
-    ----------
-    pose : (n,) int32 array
-        ``24 * template cell + rotation`` of each voxel.
-    energy : float
-        Weighted energy of the poses.
-    tree : SpanningTree or None
-        The best of the spanning trees drawn.
-    penalty : float
-        For what does not fold of that tree; 0 when it folds.
-    focus : (k,) int32 array
-        Voxels on hinges in trouble.
-    guide : (g, 5) int32 array or None
-        Steps that the planner found for the tree.
-    """
-
-    pose: NDArray[np.int32]
-    energy: float
-    tree: SpanningTree | None
-    penalty: float
-    focus: NDArray[np.int32] = field(default_factory=lambda: _ANYWHERE)
-    guide: NDArray[np.int32] | None = None
-
-
-@dataclass(frozen=True)
-class _FoldingObjective:
-    """Weights and temperatures of phase A, which depend on the size of the problem.
-
-    Attributes
-    ----------
-    stuck_hinge : float
-        Penalty for a hinge that cannot move.
-    energy : float
-        Factor on the energy of the poses.
-    joint : float
-        Energy of a single hinge in phase A.
-    hot, cold : float
-        First and last temperature.
-    """
-
-    stuck_hinge: float
-    energy: float
-    joint: float
-    hot: float
-    cold: float
 
 
 #: Share of steps of phase A that start from the hinges in trouble.
@@ -146,25 +58,6 @@ _POLISH_EACH, _POLISH_BEST = (0.1, 0.02), (0.05, 0.005)
 _SAME_POSES = 0.05
 #: Energy of a piece that no hinge joins, while poses are made joinable and after.
 _PIECE_WHILE_JOINING, _PIECE = 2.0, 10.0
-
-
-def _folding_objective(voxels: int) -> _FoldingObjective:
-    # A hinge that cannot move must cost about as much as the energy a few joints bring; large
-    # problems need the penalty to rule, or the energy freezes before anything folds.
-    if voxels <= 72:
-        return _FoldingObjective(stuck_hinge=0.15, energy=1.0, joint=0.1, hot=0.15, cold=0.02)
-    return _FoldingObjective(stuck_hinge=1.0, energy=0.2, joint=0.1, hot=0.1, cold=0.01)
-
-
-def _steps_of_path(tree: FoldTree, path: NDArray[np.int32]) -> NDArray[np.int32]:
-    """The moves of a path as steps that guide the planner, (g, 5)."""
-    steps: list[tuple[int, int, int, int, int]] = []
-    for number, quarters in path.tolist():
-        hinge = tree.hinges[number]
-        x, y, z = (round(2 * value) for value in hinge.point)
-        way = 1 if quarters * hinge.angle_deg > 0 else -1
-        steps += [(x, y, z, int(np.flatnonzero(hinge.direction)[0]), way)] * abs(quarters)
-    return np.array(steps, np.int32).reshape(-1, 5)
 
 
 class _Search:
@@ -189,14 +82,14 @@ class _Search:
         self.stopped = stop or (lambda: False)
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
         self.generator = generator(int(self.rng.integers(2**62)))
-        self.objective = _folding_objective(len(problem))
+        self.objective = folding_objective(len(problem))
         # Phase A has a joint weight of its own; double hinges keep their ratio to single ones.
         single, double = problem.weights.single, problem.weights.double
         weight = np.full(len(problem.joints), self.objective.joint)
         weight[problem.tables.last_single + 1 :] *= double / single if single > 0 else 1.0
         weight[0] = 0.0
         self.phase_a_tables = self.tables = problem.tables._replace(joint_weight=weight)
-        self.results: list[_State] = []
+        self.results: list[SearchState] = []
 
     # --- moves -----------------------------------------------------------------------------
 
@@ -206,7 +99,7 @@ class _Search:
         threshold: float,
         tries: int,
         piece_penalty: float,
-        focus: NDArray[np.int32] = _ANYWHERE,
+        focus: NDArray[np.int32] = ANYWHERE,
         heat: float = 0.0,
     ) -> tuple[NDArray[np.int32], float, int] | None:
         """Other poses with energy, and penalty for loose pieces, of at most `threshold`.
@@ -235,7 +128,7 @@ class _Search:
         self.statistics.removals += used
         return None if math.isinf(energy) else (out, energy, left)
 
-    def make_joinable(self, pose: NDArray[np.int32]) -> _State | None:
+    def make_joinable(self, pose: NDArray[np.int32]) -> SearchState | None:
         """Anneal grown poses until hinges that can turn join all the clusters."""
         choice = hinge_choice(self.problem, pose)
         left = int(loose_pieces(choice.rows, choice.clusters, 8, self.generator))
@@ -247,28 +140,7 @@ class _Search:
             found = self.neighbour(pose, threshold, 100, _PIECE_WHILE_JOINING)
             if found is not None:
                 pose, value, left = found
-        return None if left else _State(pose, value, None, 0.0)
-
-    def trees(
-        self, choice: HingeChoice, kept_pairs: set[tuple[int, int]], count: int
-    ) -> Iterator[SpanningTree]:
-        """Different random spanning trees; the first ones keep most hinges of `kept_pairs`."""
-        seen: set[frozenset[tuple[int, int]]] = set()
-        kept = choice.preference(kept_pairs, 1.0)
-        for k in range(count):
-            bonus = (2.0, 0.7, 0.0)[min(k, 2)]
-            for _ in range(8):
-                # Hinges on one lattice edge exclude each other, so a random choice may not span.
-                tree = choice.tree(bonus * kept, self.generator)
-                if tree is not None:
-                    break
-            else:
-                continue
-            pairs = frozenset(tree.hinged_pairs)
-            if pairs not in seen:
-                seen.add(pairs)
-                self.statistics.trees += 1
-                yield tree
+        return None if left else SearchState(pose, value, None, 0.0)
 
     # --- judging ---------------------------------------------------------------------------
 
@@ -297,10 +169,10 @@ class _Search:
         self,
         pose: NDArray[np.int32],
         energy: float,
-        before: _State | None,
+        before: SearchState | None,
         bound: float,
         plan: bool = True,
-    ) -> _State | None:
+    ) -> SearchState | None:
         """The best spanning tree for these poses, or None where its penalty exceeds `bound`.
 
         Hinges and steps are kept from the state `before` where that is possible. Without `plan`
@@ -308,12 +180,13 @@ class _Search:
         """
         choice = hinge_choice(self.problem, pose)
         self.statistics.judged += 1
-        best: _State | None = None
+        best: SearchState | None = None
         kept: set[tuple[int, int]] = set()
         guide = None
         if before is not None and before.tree is not None:
             kept, guide = before.tree.hinged_pairs, before.guide
-        for tree in self.trees(choice, kept, self.effort.spanning_trees):
+        for tree in choice.trees(kept, self.effort.spanning_trees, self.generator):
+            self.statistics.trees += 1
             stuck = self.judge.stuck_hinges(tree.system)
             penalty = self.objective.stuck_hinge * float(stuck.sum())
             trouble = stuck.any(axis=0)
@@ -327,7 +200,7 @@ class _Search:
                 steps = found.guide
             if best is None or penalty < best.penalty:
                 focus = np.unique(tree.joints[trouble, :2]).astype(np.int32)
-                best = _State(pose, energy, tree, penalty, focus, steps)
+                best = SearchState(pose, energy, tree, penalty, focus, steps)
             if penalty == 0:
                 break
         if best is None or best.penalty > bound:
@@ -336,10 +209,10 @@ class _Search:
 
     # --- phases ----------------------------------------------------------------------------
 
-    def starts(self) -> Iterator[_State]:
+    def starts(self) -> Iterator[SearchState]:
         """Joinable poses to start from: of each `choices` that were grown the best."""
         effort, statistics = self.effort, self.statistics
-        best: _State | None = None
+        best: SearchState | None = None
         tried = 0
         for pose in grow(
             self.problem,
@@ -362,7 +235,7 @@ class _Search:
         if best is not None:
             yield best
 
-    def settle(self, start: _State, steps: int, hot: float) -> _State | None:
+    def settle(self, start: SearchState, steps: int, hot: float) -> SearchState | None:
         """Lower energy and stuck hinges together, by the closure test alone."""
         weight = self.objective.energy
         now = self.judged(start.pose, start.energy, None, math.inf, plan=False)
@@ -374,14 +247,14 @@ class _Search:
             heat = hot * (_SETTLE_COLD / hot) ** (step / steps)
             value = weight * now.energy + now.penalty + heat * self.rng.exponential()
             stuck = len(now.focus) > 0 and self.rng.random() < _FOCUSED
-            focus = now.focus if stuck else _ANYWHERE
+            focus = now.focus if stuck else ANYWHERE
             found = self.neighbour(now.pose, value / weight, 20, _PIECE, focus, heat)
             if found is not None:
                 bound = value - weight * found[1]
                 now = self.judged(found[0], found[1], now, bound, plan=False) or now
         return now
 
-    def fold(self, start: _State) -> _State | None:
+    def fold(self, start: SearchState) -> SearchState | None:
         """Phase A: trade energy for foldability until a tree folds."""
         objective, count = self.objective, len(self.problem)
         now = self.judged(start.pose, start.energy, None, math.inf)
@@ -400,7 +273,7 @@ class _Search:
             if self.rng.random() < _SAME_POSES:
                 pose, energy = now.pose, now.energy
             else:
-                focus = now.focus if self.rng.random() < _FOCUSED else _ANYWHERE
+                focus = now.focus if self.rng.random() < _FOCUSED else ANYWHERE
                 found = self.neighbour(now.pose, value / objective.energy, 20, _PIECE, focus, heat)
                 if found is None:
                     tests += 1
@@ -415,7 +288,7 @@ class _Search:
                 now = fresh
         return now if now.penalty == 0 else None
 
-    def polish(self, start: _State, steps: int, hot: float, cold: float) -> _State:
+    def polish(self, start: SearchState, steps: int, hot: float, cold: float) -> SearchState:
         """Phase B: anneal the energy among trees that the planner folds; returns the best."""
         now = best = start
         for step in range(steps):
@@ -437,7 +310,7 @@ class _Search:
                 best = now
         return best
 
-    def keep(self, state: _State) -> None:
+    def keep(self, state: SearchState) -> None:
         """Remember a state that folds; tell of it where it is the best so far."""
         if self.report is not None and all(state.energy < other.energy for other in self.results):
             candidate = self.candidate(state)
@@ -445,7 +318,7 @@ class _Search:
                 self.report(candidate)
         self.results.append(state)
 
-    def candidate(self, state: _State) -> Candidate | None:
+    def candidate(self, state: SearchState) -> Candidate | None:
         """The tree and path of a state; None where the long path search fails."""
         assert state.tree is not None
         path = self.judge.path(state.tree.system, state.guide)
@@ -453,7 +326,7 @@ class _Search:
             return None
         return Candidate(fold_tree(self.problem, state.pose, state.tree), path, self.seed)
 
-    def settled_and_folded(self, start: _State, steps: int, hot: float) -> _State | None:
+    def settled_and_folded(self, start: SearchState, steps: int, hot: float) -> SearchState | None:
         """A tree that folds, settled from a start and polished for a moment; None for none."""
         self.tables = self.phase_a_tables
         settled = self.settle(start, steps, hot) if steps else start
@@ -466,7 +339,7 @@ class _Search:
         self.keep(folded)
         return self.polish(folded, self.effort.polish_each, *_POLISH_EACH)
 
-    def improve(self, state: _State) -> None:
+    def improve(self, state: SearchState) -> None:
         """Polish a tree that folds; then shake, settle and fold it again until that no longer pays.
 
         An iterated local search (Lourenço, Martin and Stützle 2003).
@@ -482,10 +355,10 @@ class _Search:
             if found is not None and found.energy < now.energy - _GAIN:
                 now, idle = found, 0
 
-    def folding_states(self) -> list[_State]:
+    def folding_states(self) -> list[SearchState]:
         """Trees that fold, from several starts, each polished for a moment."""
         effort, statistics = self.effort, self.statistics
-        found: list[_State] = []
+        found: list[SearchState] = []
         for start in self.starts():
             statistics.starts += 1
             folded = self.settled_and_folded(start, effort.settling, _SETTLE_HOT)
@@ -496,21 +369,19 @@ class _Search:
                 break
         return found
 
-    def state_of(self, candidate: Candidate) -> _State | None:
+    def state_of(self, candidate: Candidate) -> SearchState | None:
         """A tree that folds as a state; None where the planner does not fold it again."""
         tree, problem = candidate.tree, self.problem
-        number = {tuple(cell): k for k, cell in enumerate(problem.template.cells.tolist())}
-        cells = np.array([number[tuple(cell)] for cell in tree.target.tolist()], np.int32)
-        turns = np.array([rotation_index(matrix) for matrix in tree.orientation], np.int32)
-        pose = 24 * cells + turns
+        pose = pose_of_tree(tree)
         energy, _ = energy_of(self.tables, pose, problem.empty_face)
         choice = hinge_choice(problem, pose)
         hinged = {(edge.parent, edge.child) for edge in tree.edges if edge.kind != "R"}
-        guide = _steps_of_path(tree, candidate.path)
-        for drawn in self.trees(choice, {(min(pair), max(pair)) for pair in hinged}, 3):
+        guide = steps_of_path(tree, candidate.path)
+        pairs = {(min(pair), max(pair)) for pair in hinged}
+        for drawn in choice.trees(pairs, 3, self.generator):
             found = self.judge.estimate(drawn.system, self.effort.long_patience, guide)
             if not found.unresolved.any():
-                return _State(pose, energy, drawn, 0.0, guide=found.guide)
+                return SearchState(pose, energy, drawn, 0.0, guide=found.guide)
         return None
 
     def go_on(self, start: Candidate) -> list[Candidate]:
@@ -547,7 +418,7 @@ class _Search:
 
     def finished(self) -> list[Candidate]:
         """The best results that differ in at least two hinges, with their paths."""
-        chosen: list[_State] = []
+        chosen: list[SearchState] = []
         out: list[Candidate] = []
         for state in sorted(self.results, key=lambda s: s.energy):
             assert state.tree is not None

@@ -1,0 +1,173 @@
+"""The voxelizations of a model as problems of the tree search, and which of them are promising."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from fabfold.errors import NoTreeError, RecipeError
+from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.lattice.template import Template
+from fabfold.recipe.recipe import Recipe
+from fabfold.recipe.recipe_wishes import weights_of
+from fabfold.search.seeds import Job, SeedResult
+from fabfold.tree.bound import closed_at_most
+from fabfold.tree.effort import Effort
+from fabfold.tree.problem import from_features
+from fabfold.tree.template_parts import restrict_to_parts
+from fabfold.voxels.features import features
+from fabfold.voxels.voxel_model import Voxels
+from fabfold.wishes.protect import rank_by_cuts, rigid_pairs
+from fabfold.wishes.wish_list import Wishes
+
+__all__ = ["VoxelizationProblems", "search_order"]
+
+
+def search_order(options: Sequence[Voxels]) -> list[Voxels]:
+    """Order in which seeds take voxelizations: from the fewest voxels to the most, and again.
+
+    What leaves much of the template free folds within seconds; what fills it better has to beat
+    that. Of each two neighbours in size one comes in the first turn, the other in the second.
+    """
+    ordered = sorted(options, key=len)
+    return ordered[0::2] + ordered[1::2]
+
+
+def _usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> list[Voxels]:
+    """Voxelizations in which the wishes can come true, in their order of search.
+
+    Raises
+    ------
+    NoTreeError
+        If there is none.
+    RecipeError
+        If the template does not go with the wishes.
+    """
+    if template.creases and (wishes.keeps or wishes.void):
+        raise RecipeError(
+            f"template {template.name!r} folds once more when it is filled: --keep and --void, "
+            "which speak of the sides of the filled template, do not go with it"
+        )
+    if template.joints == "inside":
+        # The last hinge to turn brings two halves together. With all four cells around its edge
+        # full, a quarter turn before the end some of them would have been in one another.
+        roomy = [voxels for voxels in options if len(voxels) < len(template)]
+        if not roomy:
+            raise NoTreeError(
+                f"joints inside: every voxelization fills all {len(template)} cells of template "
+                f"{template.name!r}, and the last hinge to turn needs an empty cell beside it; "
+                "take a template with a few more cells, a larger --drop-below, or allow hinges "
+                "on the surface"
+            )
+        options = roomy
+    ordered = search_order(options)
+    if wishes.regions:
+        found = [(voxels, features(voxels)) for voxels in ordered]
+        ordered = [ordered[index] for index in rank_by_cuts(wishes.regions, found, template)]
+    return ordered
+
+
+class VoxelizationProblems:
+    """Problems of a recipe's voxelizations, each made once.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        Weights and joints.
+    template : Template
+        The target shape, as it is filled.
+    options : sequence of Voxels
+        Voxelizations.
+    wishes : Wishes
+        Of the recipe.
+
+    Attributes
+    ----------
+    options : list of Voxels
+        Those in which the wishes can come true, from the fewest voxels on, see
+        :func:`search_order`. They are spoken of by their number here.
+
+    Raises
+    ------
+    NoTreeError
+        If the wishes can come true in none.
+    RecipeError
+        If the template does not go with the wishes.
+    """
+
+    def __init__(
+        self, recipe: Recipe, template: Template, options: Sequence[Voxels], wishes: Wishes
+    ) -> None:
+        self.recipe, self.template, self.wishes = recipe, template, wishes
+        self.options = _usable(options, template, wishes)
+        self._jobs: dict[int, Job | SeedResult] = {}
+        self._at_most: dict[int, float] = {}
+        self._closing: list[int] | None = None
+
+    def job(self, option: int, seed: int) -> Job | SeedResult:
+        """The problem of a voxelization, or the result where it rules every tree out.
+
+        Parameters
+        ----------
+        option : int
+            Number of the voxelization.
+        seed : int
+            Decides the faces of the parts, where the template folds once more.
+        """
+        if self.template.creases:
+            return self._job_of(option, seed)  # the faces of the parts depend on the seed
+        if option not in self._jobs:
+            self._jobs[option] = self._job_of(option, seed)
+        return self._jobs[option]
+
+    def _job_of(self, option: int, seed: int) -> Job | SeedResult:
+        voxels = self.options[option]
+        joints = features(voxels)
+        protected = self.wishes.protected(voxels, joints, self.template)
+        try:
+            problem = from_features(
+                voxels,
+                joints,
+                self.template,
+                weights_of(self.recipe),
+                extra_cost=self.wishes.extra_cost(voxels, self.template),
+                always_rigid=rigid_pairs(protected, joints),
+                joints=self.recipe.joints,
+                share=self.recipe.share,
+            )
+            problem = self.wishes.with_roots(problem, voxels, self.template)
+            if self.template.creases:
+                problem = restrict_to_parts(problem, seed, joints.depth)
+        except NoTreeError as error:
+            return SeedResult((), fits=False, why=str(error))
+        return Job(problem, LatticeFoldability(), Effort())
+
+    def closing_order(self) -> list[int]:
+        """Voxelizations by how closed the box could be, most first; by cuts with --protect."""
+        if self._closing is None:
+            order = range(len(self.options))
+            if self.wishes.regions:
+                self._closing = list(order)
+            else:
+                most = [self.at_most(option) for option in order]
+                # Of equals the fuller one.
+                self._closing = sorted(order, key=lambda k: (-most[k], -len(self.options[k])))
+        return self._closing
+
+    def promising_order(self, found: Mapping[int, float]) -> list[int]:
+        """Voxelizations by the best tree found on each, and what nothing was found on after.
+
+        Parameters
+        ----------
+        found : mapping of int to float
+            Least energy by voxelization.
+        """
+        order = self.closing_order()
+        return sorted(order, key=lambda k: (found.get(k, float("inf")), order.index(k)))
+
+    def at_most(self, option: int) -> float:
+        """Share to which the box could be closed with a voxelization; 0 where no tree fits."""
+        if option not in self._at_most:
+            job = self.job(option, self.recipe.seed)
+            closed = closed_at_most(job.problem) if isinstance(job, Job) else 0.0
+            self._at_most[option] = closed
+        return self._at_most[option]
