@@ -59,6 +59,10 @@ class Recipe(BaseModel):
     rounds: Annotated[
         int, Field(ge=1, le=1000, description="rounds of seeds before the search gives up")
     ] = 8
+    thicken: Annotated[
+        Literal["auto", "off"] | Annotated[float, Field(gt=0, le=1000)],
+        Field(description="thin parts: auto thickens where nothing else works, off, or least mm"),
+    ] = "auto"
     drop_below: Annotated[
         float, Field(ge=0, le=0.5, description="cells with a smaller share of material are dropped")
     ] = 0.04
@@ -140,6 +144,19 @@ class Recipe(BaseModel):
         if not is_file_name(value):
             load_template(value)
         return value
+
+    @field_validator("thicken")
+    @classmethod
+    def _at_most_a_voxel(cls, value: str | float, info: ValidationInfo) -> str | float:
+        side = info.data.get("voxel_mm")
+        if not isinstance(value, str) and side is not None and value > side:
+            raise ValueError(f"parts cannot be made thicker than a voxel, which is {side:g} mm")
+        return value
+
+    @property
+    def thickness(self) -> float | None:
+        """Least thickness of all parts in voxel sides; None where no number is asked for."""
+        return None if isinstance(self.thicken, str) else self.thicken / self.voxel_mm
 
     @property
     def name(self) -> str:
