@@ -73,12 +73,12 @@ def save_cut(store: StageStore, cut: Cut) -> list[str]:
     for name, voxels in zip(names, cut.options, strict=True):
         save_voxels(store.path(name), voxels)
     write_json(store.path("cut.json"), {"wanted": cut.wanted, "least": cut.least})
-    return ["cut.json", *_save_mesh(store, "cut-solid.npz", cut.solid), *names]
+    return [*_save_mesh(store, "cut-solid.npz", cut.solid), "cut.json", *names]
 
 
 def load_cut(store: StageStore, files: list[str]) -> Cut:
     """Read what :func:`save_cut` wrote."""
-    about, solid, *names = files
+    solid, about, *names = files
     data = json.loads(store.path(about).read_text(encoding="utf-8"))
     return Cut(
         _load_mesh(store, solid),

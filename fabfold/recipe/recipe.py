@@ -60,7 +60,7 @@ class Recipe(BaseModel):
         int, Field(ge=1, le=1000, description="rounds of seeds before the search gives up")
     ] = 8
     thicken: Annotated[
-        Literal["auto", "off"] | Annotated[float, Field(gt=0, le=1000)],
+        Literal["auto", "off"] | float,
         Field(description="thin parts: auto thickens where nothing else works, off, or least mm"),
     ] = "auto"
     drop_below: Annotated[
@@ -145,13 +145,20 @@ class Recipe(BaseModel):
             load_template(value)
         return value
 
-    @field_validator("thicken")
+    @field_validator("thicken", mode="before")
     @classmethod
-    def _at_most_a_voxel(cls, value: str | float, info: ValidationInfo) -> str | float:
-        side = info.data.get("voxel_mm")
-        if not isinstance(value, str) and side is not None and value > side:
-            raise ValueError(f"parts cannot be made thicker than a voxel, which is {side:g} mm")
-        return value
+    def _at_most_a_voxel(cls, value: object, info: ValidationInfo) -> object:
+        if value in ("auto", "off"):
+            return value
+        most = info.data.get("voxel_mm", 1000.0)
+        number = float("nan")
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            number = float(value)
+        if not 0 < number <= most:
+            raise ValueError(
+                f"must be auto, off, or a thickness in mm, at most the {most:g} mm of a voxel"
+            )
+        return number
 
     @property
     def thickness(self) -> float | None:

@@ -1,7 +1,7 @@
 """Thicken what is too thin of a solid; what is thick enough keeps its surface.
 
 The surface is sampled, and each sample gets the largest ball inside the solid that touches it
-there. Balls that are smaller than wanted mark what is thin, but for those beside a thick place: at
+there. Balls that are smaller than wanted mark what is thin, but for those beside a larger ball: at
 every convex edge the balls become small, and edges shall stay sharp. About the centres of the balls
 that are left, the medial axis of the thin parts, a solid of the wanted thickness is laid, and
 united with the model.
@@ -35,11 +35,19 @@ Floats = NDArray[np.float64]
 _SPACING = 0.4
 _LEAST_SAMPLES = 20_000
 _MOST_SAMPLES = 120_000
+#: Shortest chord between the two touching points of a ball, in radii: they are 45 degrees apart.
+_LEAST_CHORD = 0.77
 #: A ball counts as too small where it lacks more than this share of the wanted radius.
 _SLACK = 0.04
-#: Balls nearer to a thick place than this, in wanted half thicknesses, belong to its edge. The ball
-#: that fits into a right-angled corner leaves 0.73 of its radius free.
-_EDGE = 1.0
+#: A small ball whose centre is nearer than this to that of a ball that is large enough, in radii of
+#: the large one, fills its edge. A right-angled corner is 1.73 radii from the ball that fits in.
+_EDGE = 1.8
+#: So does a ball where the balls grow by more than this share of the way to a larger one: by 0.58
+#: towards a right-angled corner, by 0.71 towards an edge.
+_GROWTH = 0.45
+#: Balls are compared with those of so many sizes, each smaller by this factor.
+_SIZES = 26
+_STEP = 0.89
 #: Spacing of the grid for the new surface, in wanted half thicknesses, as long as it has at most so
 #: many points.
 _GRID = 0.3
@@ -124,9 +132,12 @@ def inner_balls(vertices: Floats, faces: NDArray[np.int32], radius: float) -> In
         squared = np.einsum("ij,ij->i", step, step)
         facing = np.einsum("ij,ij->i", mine, other)
         shrunk = squared / np.maximum(2 * towards, 1e-12)
-        # Opposite the sample the surface is a plane, which touches nearer than its own sample does.
+        # Off to the side of that sample the surface goes on as a plane, which touches sooner.
         plane = np.einsum("ij,ij->i", step, other) / np.maximum(1 - facing, 1e-12)
-        shrunk = np.where((facing < 0) & (plane > 0), np.minimum(shrunk, plane), shrunk)
+        shrunk = np.where((facing < 0.5) & (plane > 0), np.minimum(shrunk, plane), shrunk)
+        # Where both touch the ball on one side of it, they only show a facet of a round surface.
+        across = squared > (_LEAST_CHORD * shrunk) ** 2
+        active, shrunk = active[across], shrunk[across]
         radii[active] = np.clip(shrunk, 1e-3 * radius, radii[active] * (1 - 1e-3))
         active = active[radii[active] > 1e-3 * radius]
     return InnerBalls(points, points - radii[:, None] * normals, radii)
@@ -187,13 +198,24 @@ def _samples(vertices: Floats, faces: NDArray[np.int32], radius: float) -> tuple
 
 
 def _thin(balls: InnerBalls, radius: float) -> NDArray[np.bool_]:
-    """Mask of the samples that lie on a thin part, and not on an edge of a thick one."""
+    """Mask of the samples whose balls lie on the medial axis of a thin part, and on no edge."""
     from scipy.spatial import cKDTree
 
-    thin = balls.radii < (1 - _SLACK) * radius
-    if thin.any() and not thin.all():
-        gap, _ = cKDTree(balls.points[~thin]).query(balls.centres[thin])
-        thin[np.flatnonzero(thin)[gap < _EDGE * radius]] = False
+    size = (1 - _SLACK) * radius
+    thin = balls.radii < size
+    for place in range(_SIZES):
+        large = balls.radii >= size
+        small = np.flatnonzero(thin & ~large)
+        if large.any() and len(small):
+            reach = _EDGE * radius if place == 0 else size / _GROWTH
+            gap, _ = cKDTree(balls.centres[large]).query(
+                balls.centres[small], distance_upper_bound=reach
+            )
+            steep = np.isfinite(gap)
+            if place > 0:
+                steep &= balls.radii[small] < size - _GROWTH * gap
+            thin[small[steep]] = False
+        size *= _STEP
     return np.asarray(thin)
 
 
