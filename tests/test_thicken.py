@@ -263,11 +263,16 @@ def test_the_command_tells_by_how_much_and_off_refuses(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_wheel_of_wires_folds(tmp_path):
+def test_a_thin_plate_folds(tmp_path):
+    import trimesh
+
+    plate = solid_of(box(0, 0, 0, 100, 100, 1))
+    model = tmp_path / "plate.stl"
+    trimesh.Trimesh(plate.vertices, plate.faces, process=False).export(model)
     kit = Kit.from_model(
-        wheel(tmp_path), template="box-3x3x4", effort="quick", folder=tmp_path / "kit", workers=1
+        model, template="box-4x4x4", effort="quick", folder=tmp_path / "kit", workers=1
     )
     kit.export()
     assert all(check.ok for check in kit.check())
     report = json.loads((tmp_path / "kit" / "report.json").read_text(encoding="utf-8"))
-    assert any("thickened by" in note for note in report["summary"]["repairs"])
+    assert any("bosses" in note for note in report["summary"]["repairs"])
