@@ -99,6 +99,15 @@ DropBelow = Annotated[
         "--drop-below", help="Drop cells with less material than this share. Default: 0.04."
     ),
 ]
+Thicken = Annotated[
+    str | None,
+    typer.Option(
+        "--thicken",
+        metavar="auto|off|MM",
+        help="Thicken what is too thin for walls and hinges: where nothing else works (auto), "
+        "never (off), or all that is thinner than MM, in mm as printed. Default: auto.",
+    ),
+]
 Prefer = Annotated[
     str | None,
     typer.Option(
@@ -257,7 +266,7 @@ def _kit(source: str, output: Path | None, quiet: bool, **options: Any) -> Kit:
         options[name] = _triple(options[name], f"--{name}")
     for name in ("keep", "protect"):
         options[name] = options[name] or None
-    for name in ("prefer", "void"):
+    for name in ("prefer", "void", "thicken"):
         options[name] = _number(options[name])
     if output is None and not (Path(source).is_dir() or source.endswith(".toml")):
         output = Path(f"{Path(source.removeprefix('sample:')).stem}-kit")
@@ -281,6 +290,7 @@ def _stage(name: str, summary: str) -> None:
         seed: Seed = None,
         effort: Effort = None,
         rounds: Rounds = None,
+        thicken: Thicken = None,
         drop_below: DropBelow = None,
         rotation: Rotation = None,
         origin: Origin = None,

@@ -113,7 +113,7 @@ def show_result(kit: Kit, stage: str) -> None:
 
 
 def _result_lines(kit: Kit, stage: str) -> list[str]:
-    lines = [f"note: {note}" for note in kit.solid().notes]
+    lines = [f"note: {note}" for note in kit.cut_solid().notes]
     if stage == "voxelize":
         template = kit.template
         even, odd = template.colours

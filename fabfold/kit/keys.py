@@ -27,6 +27,7 @@ def voxels_key(recipe: Recipe, template: Template) -> str:
         template.content,
         recipe.seed,
         [recipe.rotation, recipe.origin, recipe.pitch, recipe.drop_below],
+        ["thicken", "off" if recipe.thicken == "off" else recipe.thickness],
         *([list(recipe.protect)] if recipe.protect else []),
     )
 

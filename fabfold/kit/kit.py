@@ -18,7 +18,6 @@ from fabfold.errors import CheckError, GeometryError, KitError, NoFoldError, Rec
 from fabfold.files import write_text
 from fabfold.kit import keys
 from fabfold.kit.stages import BuiltTree, PlannedTree, build
-from fabfold.lattice.rotations import rotation_of_degrees
 from fabfold.lattice.template import Template
 from fabfold.progress import Listener, Progress, SilentListener
 from fabfold.recipe.recipe import Recipe
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from fabfold.search.rounds import Rounds
     from fabfold.solid.closed_solid import Solid
     from fabfold.tree.candidate import Candidate
+    from fabfold.voxels.thickening import Cut
     from fabfold.voxels.voxel_model import Voxels
     from fabfold.wishes.wish_list import Wishes
 
@@ -159,30 +159,28 @@ class Kit:
 
     def voxelize(self) -> list[Voxels]:
         """Voxelizations of the model, best first (paper section 3)."""
-        from fabfold.kit.stage_files import load_options, save_options
-        from fabfold.voxels.voxelize import voxelize
+        return self._cut().options
 
-        recipe = self.recipe
+    def cut_solid(self) -> Solid:
+        """What the voxels are cut from: the model, thickened where it was too thin.
+
+        Its notes tell by how much.
+        """
+        cut = self._cut()
+        return replace(cut.solid, notes=(*self.solid().notes, *cut.notes(self.recipe.voxel_mm)))
+
+    def _cut(self) -> Cut:
+        from fabfold.kit.cutting_stage import cut_model
+        from fabfold.kit.stage_files import load_cut, save_cut
+
         solid = self.solid()
         regions = self.wishes().regions
 
-        def make(progress: Progress) -> list[Voxels]:
-            found = voxelize(
-                solid,
-                self._template,
-                seed=recipe.seed,
-                rotation=None if recipe.rotation is None else rotation_of_degrees(recipe.rotation),
-                origin=recipe.origin,
-                pitch=recipe.pitch,
-                drop_below=recipe.drop_below,
-                regions=regions,
-                progress=progress,
-            )
-            progress.update(1.0, f"{len(found[0])} voxels")
-            return found
+        def make(progress: Progress) -> Cut:
+            return cut_model(self.recipe, solid, self._template, regions, progress)
 
-        key = keys.voxels_key(recipe, self._template)
-        return self._stage("voxelize", key, make, save_options, load_options)
+        key = keys.voxels_key(self.recipe, self._template)
+        return self._stage("voxelize", key, make, save_cut, load_cut)
 
     def fit(self) -> list[Candidate]:
         """Trees that fold, best first (paper section 4), of the first round that finds any.
@@ -290,7 +288,7 @@ class Kit:
         checks = self.check()
         with self.listener.stage("export") as progress:
             write_kit(
-                target, self.recipe, profile, self.solid(), built, checks, progress,
+                target, self.recipe, profile, self.cut_solid(), built, checks, progress,
                 self.wish_report(built.planned, built.joinery), self._template,
             )  # fmt: skip
         if target != self.folder:
@@ -316,7 +314,7 @@ class Kit:
         writing.write_built(self.folder, built)
         if stage == "check":
             wishes = self.wish_report(built.planned, built.joinery)
-            writing.write_checks(self.folder, self.solid(), built, result, wishes)
+            writing.write_checks(self.folder, self.cut_solid(), built, result, wishes)
 
     # How the stages hang together ---------------------------------------------------------------
 

@@ -16,18 +16,18 @@ from fabfold.printing.checks import Check
 from fabfold.solid.closed_solid import Paint, Solid
 from fabfold.store import StageStore
 from fabfold.tree.fold_tree import FoldTree
+from fabfold.voxels.thickening import Cut
 from fabfold.voxels.voxel_files import load_voxels, save_voxels
-from fabfold.voxels.voxel_model import Voxels
 
 __all__ = [
     "load_built",
     "load_checks",
-    "load_options",
+    "load_cut",
     "load_planned",
     "load_solid",
     "save_built",
     "save_checks",
-    "save_options",
+    "save_cut",
     "save_planned",
     "save_solid",
 ]
@@ -35,8 +35,17 @@ __all__ = [
 
 def save_solid(store: StageStore, solid: Solid) -> list[str]:
     """Write a solid."""
+    return _save_mesh(store, "solid.npz", solid)
+
+
+def load_solid(store: StageStore, files: list[str]) -> Solid:
+    """Read what :func:`save_solid` wrote."""
+    return _load_mesh(store, files[0])
+
+
+def _save_mesh(store: StageStore, file: str, solid: Solid) -> list[str]:
     write_npz(
-        store.path("solid.npz"),
+        store.path(file),
         {
             "vertices": solid.vertices,
             "faces": solid.faces,
@@ -48,28 +57,35 @@ def save_solid(store: StageStore, solid: Solid) -> list[str]:
             ),
         },
     )
-    return ["solid.npz"]
+    return [file]
 
 
-def load_solid(store: StageStore, files: list[str]) -> Solid:
-    """Read what :func:`save_solid` wrote."""
-    with np.load(store.path(files[0]), allow_pickle=False) as data:
+def _load_mesh(store: StageStore, file: str) -> Solid:
+    with np.load(store.path(file), allow_pickle=False) as data:
         name, digest, *notes = (str(text) for text in data["about"])
         paint = Paint(data["paint"], data["colours"]) if "paint" in data.files else None
         return Solid(name, data["vertices"], data["faces"], tuple(notes), digest, paint)
 
 
-def save_options(store: StageStore, options: list[Voxels]) -> list[str]:
-    """Write voxelizations, best first."""
-    names = [f"voxels-{index:02d}.npz" for index in range(len(options))]
-    for name, voxels in zip(names, options, strict=True):
+def save_cut(store: StageStore, cut: Cut) -> list[str]:
+    """Write voxelizations, best first, and what they are cut from."""
+    names = [f"voxels-{index:02d}.npz" for index in range(len(cut.options))]
+    for name, voxels in zip(names, cut.options, strict=True):
         save_voxels(store.path(name), voxels)
-    return names
+    write_json(store.path("cut.json"), {"wanted": cut.wanted, "least": cut.least})
+    return [*_save_mesh(store, "cut-solid.npz", cut.solid), "cut.json", *names]
 
 
-def load_options(store: StageStore, files: list[str]) -> list[Voxels]:
-    """Read what :func:`save_options` wrote."""
-    return [load_voxels(store.path(name)) for name in files]
+def load_cut(store: StageStore, files: list[str]) -> Cut:
+    """Read what :func:`save_cut` wrote."""
+    solid, about, *names = files
+    data = json.loads(store.path(about).read_text(encoding="utf-8"))
+    return Cut(
+        _load_mesh(store, solid),
+        [load_voxels(store.path(name)) for name in names],
+        float(data["wanted"]),
+        float(data["least"]),
+    )
 
 
 def save_planned(store: StageStore, planned: PlannedTree) -> list[str]:

@@ -59,6 +59,10 @@ class Recipe(BaseModel):
     rounds: Annotated[
         int, Field(ge=1, le=1000, description="rounds of seeds before the search gives up")
     ] = 8
+    thicken: Annotated[
+        Literal["auto", "off"] | float,
+        Field(description="thin parts: auto thickens where nothing else works, off, or least mm"),
+    ] = "auto"
     drop_below: Annotated[
         float, Field(ge=0, le=0.5, description="cells with a smaller share of material are dropped")
     ] = 0.04
@@ -140,6 +144,26 @@ class Recipe(BaseModel):
         if not is_file_name(value):
             load_template(value)
         return value
+
+    @field_validator("thicken", mode="before")
+    @classmethod
+    def _at_most_a_voxel(cls, value: object, info: ValidationInfo) -> object:
+        if value in ("auto", "off"):
+            return value
+        most = info.data.get("voxel_mm", 1000.0)
+        number = float("nan")
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            number = float(value)
+        if not 0 < number <= most:
+            raise ValueError(
+                f"must be auto, off, or a thickness in mm, at most the {most:g} mm of a voxel"
+            )
+        return number
+
+    @property
+    def thickness(self) -> float | None:
+        """Least thickness of all parts in voxel sides; None where no number is asked for."""
+        return None if isinstance(self.thicken, str) else self.thicken / self.voxel_mm
 
     @property
     def name(self) -> str:

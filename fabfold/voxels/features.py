@@ -207,17 +207,21 @@ def features(voxels: Voxels) -> Features:
     -------
     Features
         `rigid`, `hinge` and `double` look at the largest piece of each voxel only: a hinge on a
-        crumb, or a wall that touches the second leg in a cell, holds nothing.
+        crumb, or a wall that touches the second leg in a cell, holds nothing. Where the voxels ask
+        for bosses, each edge of a face with a rigid contact can hold a hinge.
     """
     if voxels.subvoxels.shape[1:] != (SUBDIVISION,) * 3:
         raise ValueError(f"subvoxels must be (n, 20, 20, 20), not {voxels.subvoxels.shape}")
     main = largest_pieces(voxels.subvoxels)
     pairs = face_pairs(voxels.cells)
     held = contact_counts(voxels.cells, pairs, main)
+    hinge = _hinge_edges(voxels.cells, pairs, main)
+    if voxels.bosses:
+        hinge |= (held >= RIGID_CONTACT)[:, None]
     return Features(
         pairs=pairs,
         rigid=held >= RIGID_CONTACT,
-        hinge=_hinge_edges(voxels.cells, pairs, main),
+        hinge=hinge,
         double=held >= DOUBLE_CONTACT,
         depth=_ray_depth(voxels.subvoxels),
     )

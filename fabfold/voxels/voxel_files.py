@@ -55,6 +55,7 @@ def save_voxels(path: Path, voxels: Voxels) -> None:
         "lost_volume": np.array(voxels.lost_volume),
         "energy_names": np.array(names, dtype=np.str_),
         "energy_values": np.array([voxels.energy[name] for name in names], dtype=np.float64),
+        **({"bosses": np.array(True)} if voxels.bosses else {}),
     }
     write_npz(Path(path), arrays)
 
@@ -97,6 +98,7 @@ def load_voxels(path: Path) -> Voxels:
                 plane_offsets=(data["offsets_x"], data["offsets_y"], data["offsets_z"]),
                 lost_volume=float(data["lost_volume"]),
                 energy=dict(zip(names, data["energy_values"].tolist(), strict=True)),
+                bosses="bosses" in data.files,
             )
     except _UNREADABLE as error:
         raise KitError(

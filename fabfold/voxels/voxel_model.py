@@ -46,6 +46,9 @@ class Voxels:
         Share of the model's volume in cells that were dropped.
     energy : dict of str to float
         The terms of the placement's score, by name (``"fullness"`` is Eq. 1).
+    bosses : bool
+        Whether a hinge may also stand where the model does not reach the edge: between voxels whose
+        material touches, on bosses that the join stage ties to it.
     """
 
     cells: NDArray[np.int32]
@@ -59,6 +62,7 @@ class Voxels:
     plane_offsets: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
     lost_volume: float
     energy: dict[str, float]
+    bosses: bool = False
 
     def __len__(self) -> int:
         return len(self.cells)

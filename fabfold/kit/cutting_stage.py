@@ -1,0 +1,79 @@
+"""The stage that cuts the model into voxels, as its recipe asks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fabfold.lattice.rotations import rotation_of_degrees
+from fabfold.lattice.template import Template
+from fabfold.progress import Progress
+from fabfold.recipe.recipe import Recipe
+from fabfold.solid.closed_solid import Solid
+from fabfold.solid.regions import Region
+from fabfold.voxels.thickening import Cut, cut_thick
+from fabfold.voxels.voxel_model import Voxels
+from fabfold.voxels.voxelize import voxelize
+
+__all__ = ["cut_model"]
+
+
+def cut_model(
+    recipe: Recipe,
+    solid: Solid,
+    template: Template,
+    regions: Sequence[Region],
+    progress: Progress,
+) -> Cut:
+    """Cut a model into voxels, thickened as the recipe asks.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        Seed, grid and thickness.
+    solid : Solid
+        The model.
+    template : Template
+        The target shape, as it is filled.
+    regions : sequence of Region
+        Parts of the model that shall lie in few cells.
+    progress : Progress
+        Hears of the stages of the search.
+
+    Raises
+    ------
+    NoVoxelsError
+        If no placement of the grid fits.
+    """
+
+    def cut(model: Solid) -> list[Voxels]:
+        return voxelize(
+            model,
+            template,
+            seed=recipe.seed,
+            rotation=None if recipe.rotation is None else rotation_of_degrees(recipe.rotation),
+            origin=recipe.origin,
+            pitch=recipe.pitch,
+            drop_below=recipe.drop_below,
+            regions=regions,
+            progress=progress,
+        )
+
+    if recipe.thicken == "off":
+        found = Cut(solid, cut(solid))
+    else:
+        found = cut_thick(
+            solid,
+            template,
+            cut,
+            thicken=recipe.thickness,
+            seed=recipe.seed,
+            drop_below=recipe.drop_below,
+            pitch=recipe.pitch,
+            progress=progress,
+        )
+    progress.update(1.0, ", ".join([f"{len(found.options[0])} voxels", *_told(found, recipe)]))
+    return found
+
+
+def _told(cut: Cut, recipe: Recipe) -> list[str]:
+    return [note.partition(":")[0] for note in cut.notes(recipe.voxel_mm)]
