@@ -26,6 +26,7 @@ _TITLES = {
     "fit": "Finding trees that fold",
     "pareto": "Finding the Pareto list",
     "pictures": "Drawing the solutions",
+    "early": "A first kit that folds",
     "fold": "Taking the best tree's path",
     "join": "Making bodies and hinges",
     "check": "Checking",
@@ -136,6 +137,11 @@ def _result_lines(kit: Kit, stage: str) -> list[str]:
         f"{len(tree.source)} voxels in {len(tree.bodies)} bodies, {len(tree.hinges)} hinges, "
         f"folding into {tree.template.name} in {len(motion.moves) - 1} moves"
     )
+    closure = kit.box_closure(planned)
+    if closure is not None:
+        more = {"quick": "normal", "normal": "thorough"}.get(kit.recipe.effort)
+        hint = f"; --effort {more} looks further" if more and kit.seconds is None else ""
+        lines.append(f"{closure}{hint}")
     lines += [str(entry["text"]) for entry in kit.wish_report(planned, joinery)]
     if motion.certificate:
         lines.append(f"smallest gap on the whole path {motion.certificate['min_gap_mm']:.3f} mm")

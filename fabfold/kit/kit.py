@@ -14,10 +14,10 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from fabfold.errors import CheckError, GeometryError, KitError, NoFoldError, RecipeError
+from fabfold.errors import KitError, RecipeError
 from fabfold.files import write_text
 from fabfold.kit import keys
-from fabfold.kit.stages import BuiltTree, PlannedTree, build
+from fabfold.kit.stages import BuiltTree, PlannedTree, build_first
 from fabfold.lattice.template import Template
 from fabfold.progress import Listener, Progress, SilentListener
 from fabfold.recipe.recipe import Recipe
@@ -27,10 +27,12 @@ from fabfold.store import StageStore
 
 if TYPE_CHECKING:
     from fabfold.joinery.bodies import Joinery
+    from fabfold.kit.box_closure import BoxClosure
+    from fabfold.kit.early import EarlyKit
     from fabfold.printing.checks import Check
     from fabfold.printing.profiles import Profile
     from fabfold.search.pareto import Solution
-    from fabfold.search.rounds import Rounds
+    from fabfold.search.rounds import Found, Rounds
     from fabfold.solid.closed_solid import Solid
     from fabfold.tree.candidate import Candidate
     from fabfold.voxels.thickening import Cut
@@ -98,6 +100,7 @@ class Kit:
         self._model = model
         self._store = StageStore(folder)
         self._results: dict[str, Any] = {}
+        self._early: EarlyKit | None = None
         self._template_file = template
         self._template: Template = load_target(recipe.template, template, recipe.template_cells)
         if recipe.joints_inside:
@@ -231,18 +234,8 @@ class Kit:
         best = self.fold()
 
         def make(progress: Progress) -> BuiltTree:
-            refused: list[str] = []
-            for planned in chain([best], islice(self._planned_trees(), 1, None)):
-                try:
-                    return build(planned, profile, self.recipe.voxel_mm, tuple(refused), progress)
-                except (GeometryError, CheckError) as error:
-                    refused.append(str(error))
-                    progress.update(None, f"tree {len(refused)} refused: {error}")
-            raise NoFoldError(
-                f"none of the {len(refused)} trees that fold as cubes could be built; "
-                f"the last one: {refused[-1]}. Try another --seed, a larger --voxel-mm or a "
-                "smaller --clearance-mm"
-            )
+            trees = chain([best], islice(self._planned_trees(), 1, None))
+            return build_first(trees, profile, self.recipe.voxel_mm, progress)
 
         key = keys.join_key(self.recipe, self._template, profile, self._mark())
         return self._stage("join", key, make, save_built, load_built)
@@ -277,6 +270,7 @@ class Kit:
         KitError
             If there is no folder to write to, or it holds something else.
         """
+        from fabfold.kit.early import EarlyKit
         from fabfold.kit.writing import write_kit
 
         target = self.folder if folder is None else Path(folder)
@@ -284,12 +278,18 @@ class Kit:
             raise KitError("where to? Give a folder to export to")
         require_free_folder(target)
         profile = self.profile()
+        if target == self.folder and not self.recipe.pick:
+            self._early = EarlyKit(target, self.recipe, profile, self.listener)
+        self.fold()
+        if self._early is not None:
+            self._early.wait()
         built = self.join()
         checks = self.check()
         with self.listener.stage("export") as progress:
             write_kit(
                 target, self.recipe, profile, self.cut_solid(), built, checks, progress,
                 self.wish_report(built.planned, built.joinery), self._template,
+                self.box_closure(built.planned),
             )  # fmt: skip
         if target != self.folder:
             if self._model is not None:
@@ -299,22 +299,9 @@ class Kit:
 
     def run(self, stage: str) -> None:
         """Run one stage by name, with all before it that is missing, and write its kit files."""
-        result = getattr(self, stage)()
-        if self.folder is None or stage in ("solid", "voxelize", "export"):
-            return
-        from fabfold.kit import writing
+        from fabfold.kit.writing import write_stage
 
-        if stage == "fit":
-            writing.write_tree(self.folder, result[0].tree, self.recipe.voxel_mm)
-            return
-        if stage == "fold":
-            writing.write_planned(self.folder, result, self.recipe.voxel_mm)
-            return
-        built = self.join()
-        writing.write_built(self.folder, built)
-        if stage == "check":
-            wishes = self.wish_report(built.planned, built.joinery)
-            writing.write_checks(self.folder, self.cut_solid(), built, result, wishes)
+        write_stage(self, stage, getattr(self, stage)())
 
     # How the stages hang together ---------------------------------------------------------------
 
@@ -333,11 +320,20 @@ class Kit:
 
     def _rounds(self) -> Rounds:
         if "rounds" not in self._results:
-            self._results["rounds"] = self._rounds_of(self.recipe, seconds=self.seconds)
+            first = None if self._early is None else self._early.start
+            self._results["rounds"] = self._rounds_of(
+                self.recipe, seconds=self.seconds, on_first=first
+            )
         result: Rounds = self._results["rounds"]
         return result
 
-    def _rounds_of(self, recipe: Recipe, shift: int = 0, seconds: float | None = None) -> Rounds:
+    def _rounds_of(
+        self,
+        recipe: Recipe,
+        shift: int = 0,
+        seconds: float | None = None,
+        on_first: Callable[[Found], None] | None = None,
+    ) -> Rounds:
         """Search of the kit's voxelizations for its recipe, or one with another preference."""
         from fabfold.search.rounds import Rounds
 
@@ -353,6 +349,7 @@ class Kit:
             seconds=seconds,
             wishes=self.wishes(),
             shift=shift,
+            on_first=on_first,
         )
 
     def _mark(self) -> list[Any]:
@@ -374,6 +371,12 @@ class Kit:
         from fabfold.kit.wish_report import wish_report
 
         return wish_report(self.wishes(), planned, joinery)
+
+    def box_closure(self, planned: PlannedTree) -> BoxClosure | None:
+        """How closed the box of a tree is and could be; None where that cannot be said."""
+        from fabfold.kit.box_closure import box_closure
+
+        return box_closure(self.recipe, self._template, planned)
 
     def pareto(self) -> list[Solution]:
         """Trees that fold of which none is better than another in every respect.

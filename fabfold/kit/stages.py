@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from fabfold.errors import CheckError, GeometryError, NoFoldError
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
 from fabfold.progress import Progress
@@ -14,7 +16,7 @@ from fabfold.voxels.voxel_model import Voxels
 if TYPE_CHECKING:
     from fabfold.printing.profiles import Profile
 
-__all__ = ["BuiltTree", "PlannedTree", "build"]
+__all__ = ["BuiltTree", "PlannedTree", "build", "build_first"]
 
 
 @dataclass(frozen=True)
@@ -96,3 +98,43 @@ def build(
     )
     motion = replace(planned.motion, certificate=certificate)
     return BuiltTree(replace(planned, motion=motion), joinery, refused)
+
+
+def build_first(
+    trees: Iterable[PlannedTree], profile: Profile, voxel_mm: float, progress: Progress
+) -> BuiltTree:
+    """Build the first of several trees that survives on real bodies.
+
+    Parameters
+    ----------
+    trees : iterable of PlannedTree
+        Best first.
+    profile : Profile
+        Printer and material.
+    voxel_mm : float
+        Printed side of a voxel, mm.
+    progress : Progress
+        Hears of each that is refused.
+
+    Returns
+    -------
+    BuiltTree
+        With the reasons why those before it were passed over.
+
+    Raises
+    ------
+    NoFoldError
+        If every tree was refused; it says why.
+    """
+    refused: list[str] = []
+    for planned in trees:
+        try:
+            return build(planned, profile, voxel_mm, tuple(refused), progress)
+        except (GeometryError, CheckError) as error:
+            refused.append(str(error))
+            progress.update(None, f"tree {len(refused)} refused: {error}")
+    raise NoFoldError(
+        f"none of the {len(refused)} trees that fold as cubes could be built; "
+        f"the last one: {refused[-1]}. Try another --seed, a larger --voxel-mm or a "
+        "smaller --clearance-mm"
+    )

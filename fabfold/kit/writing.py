@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fabfold.export.colours import body_colours
 from fabfold.export.flat import flat_poses
@@ -17,6 +17,7 @@ from fabfold.export.step import write_step
 from fabfold.export.stl import write_stl
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.files import write_bytes, write_json, write_text
+from fabfold.kit.box_closure import BoxClosure
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.lattice.template import Template
 from fabfold.printing.checks import Check
@@ -28,6 +29,9 @@ from fabfold.solid.closed_solid import Solid
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.version import __version__
 
+if TYPE_CHECKING:
+    from fabfold.kit.kit import Kit
+
 __all__ = [
     "kit_summary",
     "write_built",
@@ -35,12 +39,46 @@ __all__ = [
     "write_kit",
     "write_pareto",
     "write_planned",
+    "write_printable",
+    "write_stage",
     "write_tree",
 ]
 
 
+def write_stage(kit: Kit, stage: str, result: Any) -> None:
+    """Write the kit files of one stage that was run by itself.
+
+    Parameters
+    ----------
+    kit : Kit
+        The kit.
+    stage : str
+        Name of the stage.
+    result : object
+        What it returned.
+    """
+    folder = kit.folder
+    if folder is None or stage in ("solid", "voxelize", "export"):
+        return
+    if stage == "fit":
+        write_tree(folder, result[0].tree, kit.recipe.voxel_mm)
+        return
+    if stage == "fold":
+        write_planned(folder, result, kit.recipe.voxel_mm)
+        return
+    built = kit.join()
+    write_built(folder, built)
+    if stage == "check":
+        wishes = kit.wish_report(built.planned, built.joinery)
+        closure = kit.box_closure(built.planned)
+        write_checks(folder, kit.cut_solid(), built, result, wishes, closure)
+
+
 def kit_summary(
-    solid: Solid, built: BuiltTree, wishes: Sequence[dict[str, Any]] = ()
+    solid: Solid,
+    built: BuiltTree,
+    wishes: Sequence[dict[str, Any]] = (),
+    closure: BoxClosure | None = None,
 ) -> dict[str, Any]:
     """Figures of a kit for its report: counts, volumes, energies (JSON-ready)."""
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
@@ -56,6 +94,14 @@ def kit_summary(
         "bodies": len(tree.bodies),
         "joints": tree.joints,
         "energy": {key: round(float(value), 4) for key, value in tree.energy.items()},
+        **(
+            {}
+            if closure is None
+            else {
+                "box_closed": round(closure.closed, 4),
+                "box_closed_at_most": round(closure.at_most, 4),
+            }
+        ),
         "voxel_energy": {key: round(float(value), 4) for key, value in voxels.energy.items()},
         "moves": len(motion.moves) - 1,
         "voxel_mm": joinery.voxel_mm,
@@ -105,7 +151,44 @@ def write_built(folder: Path, built: BuiltTree) -> None:
     tree, joinery = built.planned.tree, built.joinery
     write_json(folder / "tree.json", tree.to_json(joinery.voxel_mm, joinery.origin_mm))
     write_json(folder / "motion.json", built.planned.motion.to_json())
+    names = {f"{body.name}.stl" for body in joinery.bodies}
+    for old in sorted((folder / "bodies").glob("*.stl")):
+        if old.name not in names:  # of a tree with more bodies
+            old.unlink()
     write_stl(folder / "bodies", joinery)
+
+
+def write_printable(folder: Path, recipe: Recipe, profile: Profile, built: BuiltTree) -> None:
+    """Write the tree, its certified motion, and the bodies as STL and 3MF.
+
+    Parameters
+    ----------
+    folder : Path
+        Kit folder.
+    recipe : Recipe
+        Names the files.
+    profile : Profile
+        Printer and material, named in the 3MF.
+    built : BuiltTree
+        What is written.
+    """
+    tree, joinery = built.planned.tree, built.joinery
+    name = recipe.name
+    write_built(folder, built)
+    write_3mf(
+        folder / f"{name}.3mf",
+        joinery,
+        title=f"{name} folds into {tree.template.name}",
+        metadata={
+            "Application": f"fabfold {__version__}",
+            "Description": (
+                f"{len(tree.bodies)} bodies, {len(tree.hinges)} hinges, voxel "
+                f"{joinery.voxel_mm:g} mm, clearance {joinery.clearance_mm:g} mm, "
+                f"profile {profile.name}, seed {recipe.seed}"
+            ),
+        },
+        colours=body_colours(tree),
+    )
 
 
 def write_checks(
@@ -114,9 +197,10 @@ def write_checks(
     built: BuiltTree,
     checks: list[Check],
     wishes: Sequence[dict[str, Any]] = (),
+    closure: BoxClosure | None = None,
 ) -> None:
-    """Write ``report.json`` and ``report.html``; `wishes` tells what became of each wish."""
-    write_report(folder, checks, kit_summary(solid, built, wishes))
+    """Write ``report.json`` and ``report.html``, with what became of each wish and of the box."""
+    write_report(folder, checks, kit_summary(solid, built, wishes, closure))
 
 
 def write_kit(
@@ -129,6 +213,7 @@ def write_kit(
     progress: Progress,
     wishes: Sequence[dict[str, Any]] = (),
     template: Template | None = None,
+    closure: BoxClosure | None = None,
 ) -> None:
     """Write every file of the kit into `folder`.
 
@@ -152,28 +237,15 @@ def write_kit(
         What became of each wish.
     template : Template, optional
         The target as it is filled; one with creases is also written as it lies flat.
+    closure : BoxClosure, optional
+        How closed the box is, and could be.
     """
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
     name = recipe.name
     colours = body_colours(tree)
     write_text(folder / "kit.toml", recipe.to_toml())
-    progress.update(0.1, "bodies as STL")
-    write_built(folder, built)
-    progress.update(0.2, "3MF")
-    write_3mf(
-        folder / f"{name}.3mf",
-        joinery,
-        title=f"{name} folds into {tree.template.name}",
-        metadata={
-            "Application": f"fabfold {__version__}",
-            "Description": (
-                f"{len(tree.bodies)} bodies, {len(tree.hinges)} hinges, voxel "
-                f"{joinery.voxel_mm:g} mm, clearance {joinery.clearance_mm:g} mm, "
-                f"profile {profile.name}, seed {recipe.seed}"
-            ),
-        },
-        colours=colours,
-    )
+    progress.update(0.1, "bodies and 3MF")
+    write_printable(folder, recipe, profile, built)
     flat = None if template is None else flat_poses(joinery, tree, motion, template)
     if template is not None and flat is not None:
         write_3mf(
@@ -191,5 +263,5 @@ def write_kit(
     upright = built.planned.voxels.rotation.T
     write_strip(folder / "fold.png", joinery, tree, motion, colours=colours, upright=upright)
     progress.update(0.95, "report")
-    write_checks(folder, solid, built, checks, wishes)
+    write_checks(folder, solid, built, checks, wishes, closure)
     progress.update(1.0, str(folder))

@@ -27,7 +27,7 @@ from fabfold.tree.effort import Effort
 from fabfold.voxels.voxel_model import Voxels
 from fabfold.wishes.wish_list import Wishes
 
-__all__ = ["Rounds"]
+__all__ = ["Found", "Rounds"]
 
 #: Templates of more cells are large: near misses are locked by more than corners.
 LARGE = 72

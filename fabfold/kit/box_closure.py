@@ -1,0 +1,64 @@
+"""How closed the box of a kit is, and how closed it could be with its voxels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fabfold.kit.stages import PlannedTree
+from fabfold.lattice.template import Template
+from fabfold.recipe.recipe import Recipe
+from fabfold.recipe.recipe_wishes import weights_of
+from fabfold.tree.bound import closed_at_most, closed_share
+from fabfold.tree.problem import from_features
+from fabfold.voxels.features import features
+
+__all__ = ["BoxClosure", "box_closure"]
+
+
+@dataclass(frozen=True)
+class BoxClosure:
+    """Shares from 0 to 1, see :mod:`fabfold.tree.bound`.
+
+    Attributes
+    ----------
+    closed : float
+        Share to which the box is closed: 1 less the mean depth behind a visible face.
+    at_most : float
+        Share to which these voxels could close it, whatever the joints.
+    """
+
+    closed: float
+    at_most: float
+
+    def __str__(self) -> str:
+        return (
+            f"the box is closed to {100 * self.closed:.0f} % "
+            f"(at most {100 * self.at_most:.0f} % with these voxels)"
+        )
+
+
+def box_closure(recipe: Recipe, template: Template, planned: PlannedTree) -> BoxClosure | None:
+    """How closed the box of a tree is.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        Joints and weights of the search.
+    template : Template
+        The target shape, as it is filled.
+    planned : PlannedTree
+        The tree and its voxels.
+
+    Returns
+    -------
+    BoxClosure or None
+        None for a template that folds once more, whose visible faces are others in the end, and
+        where voxels share cells, for which the bound does not hold.
+    """
+    if template.creases or recipe.share:
+        return None
+    voxels = planned.voxels
+    problem = from_features(
+        voxels, features(voxels), template, weights_of(recipe), joints=recipe.joints
+    )
+    return BoxClosure(closed_share(planned.tree), closed_at_most(problem))

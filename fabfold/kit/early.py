@@ -1,0 +1,73 @@
+"""The first kit that folds, on disk while the search still looks for better ones."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+from fabfold.errors import FabfoldError
+from fabfold.fold.motion import motion_of
+from fabfold.kit.stages import PlannedTree, build
+from fabfold.printing.profiles import Profile
+from fabfold.progress import Listener
+from fabfold.recipe.recipe import Recipe
+from fabfold.search.rounds import Found
+from fabfold.tree.bound import closed_share
+
+__all__ = ["EarlyKit"]
+
+
+class EarlyKit:
+    """Builds and writes a first tree beside the search, in a thread of its own.
+
+    The search runs in processes of its own or in compiled kernels, so the thread takes little from
+    it. What is written is what a printer needs and the proof that it folds: ``tree.json``,
+    ``motion.json`` with its certificate, the bodies and the 3MF. Everything is replaced by the
+    final kit. Where the tree cannot be built, nothing is written.
+
+    Parameters
+    ----------
+    folder : Path
+        Kit folder.
+    recipe : Recipe
+        Names the files and has the size of a voxel.
+    profile : Profile
+        Printer and material.
+    listener : Listener
+        Shows that the kit is there.
+    """
+
+    def __init__(self, folder: Path, recipe: Recipe, profile: Profile, listener: Listener) -> None:
+        self._folder, self._recipe, self._profile = folder, recipe, profile
+        self._listener = listener
+        self._thread: threading.Thread | None = None
+
+    def start(self, found: Found) -> None:
+        """Begin with a tree; only the first call counts, and only in a folder without a kit."""
+        if self._thread is not None or (self._folder / "report.json").is_file():
+            return
+        voxels, candidate = found
+        motion = motion_of(candidate.tree, candidate.path)
+        planned = PlannedTree(voxels, candidate.tree, motion)
+        # A daemon, so that Ctrl-C ends the run at once: each file is written whole or not at all.
+        self._thread = threading.Thread(target=self._make, args=(planned,), daemon=True)
+        self._thread.start()
+
+    def wait(self) -> None:
+        """Wait until nothing is written any more."""
+        if self._thread is not None:
+            self._thread.join()
+
+    def _make(self, planned: PlannedTree) -> None:
+        from fabfold.kit.writing import write_printable
+
+        recipe = self._recipe
+        try:
+            with self._listener.stage("early") as progress:
+                built = build(planned, self._profile, recipe.voxel_mm, (), progress)
+                write_printable(self._folder, recipe, self._profile, built)
+                hinges, closed = len(planned.tree.hinges), 100 * closed_share(planned.tree)
+                text = f"{hinges} hinges, box closed to {closed:.0f} %; better ones replace it"
+                progress.update(1.0, text)
+        except FabfoldError:
+            return  # The bodies of this tree do not come out; the search has others.
