@@ -155,8 +155,9 @@ def test_a_round_looks_at_roomy_voxelizations_first_and_goes_on_where_it_pays(tm
     assert len(rounds.voxels(first)) == min(sizes)
     roomy, closing, *_ = schedule("quick", 0)
     order = rounds.problems.closing_order()
-    most = [rounds.problems.at_most(option) for option in order]
-    assert most == sorted(most, reverse=True)
+    assert sorted(order) == list(range(len(sizes)))
+    best = max(rounds.problems.at_most(option) for option in order)
+    assert rounds.problems.at_most(order[0]) == best
     for k in range(closing.seeds):
         voxels = rounds.voxels(first + roomy.seeds + k)
         assert voxels is rounds.problems.options[order[k % min(closing.options, len(order))]]

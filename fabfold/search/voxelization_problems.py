@@ -10,7 +10,7 @@ from fabfold.lattice.template import Template
 from fabfold.recipe.recipe import Recipe
 from fabfold.recipe.recipe_wishes import weights_of
 from fabfold.search.seeds import Job, SeedResult
-from fabfold.tree.bound import closed_at_most
+from fabfold.tree.bound import closed_at_most, visible_faces
 from fabfold.tree.effort import Effort
 from fabfold.tree.problem import from_features
 from fabfold.tree.template_parts import restrict_to_parts
@@ -64,6 +64,10 @@ def _usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> li
         found = [(voxels, features(voxels)) for voxels in ordered]
         ordered = [ordered[index] for index in rank_by_cuts(wishes.regions, found, template)]
     return ordered
+
+
+#: Voxelizations whose numbers of voxels differ by no more than this are of one size.
+_ALIKE = 2
 
 
 class VoxelizationProblems:
@@ -142,27 +146,50 @@ class VoxelizationProblems:
         return Job(problem, LatticeFoldability(), Effort())
 
     def closing_order(self) -> list[int]:
-        """Voxelizations by how closed the box could be, most first; by cuts with --protect."""
+        """Voxelizations by how closed the box could be; with --protect by cuts.
+
+        Of each size the best comes first, and only then the second of any: the fuller ones close
+        the box better, where anything folds on them.
+        """
         if self._closing is None:
-            order = range(len(self.options))
-            if self.wishes.regions:
-                self._closing = list(order)
-            else:
+            order = list(range(len(self.options)))
+            if not self.wishes.regions:
                 most = [self.at_most(option) for option in order]
                 # Of equals the fuller one.
-                self._closing = sorted(order, key=lambda k: (-most[k], -len(self.options[k])))
+                order.sort(key=lambda k: (-most[k], -len(self.options[k])))
+                turn: dict[int, int] = {}
+                before: list[int] = []
+                for option in order:
+                    size = len(self.options[option])
+                    turn[option] = sum(abs(len(self.options[k]) - size) <= _ALIKE for k in before)
+                    before.append(option)
+                order.sort(key=lambda k: turn[k])
+            self._closing = order
         return self._closing
 
     def promising_order(self, found: Mapping[int, float]) -> list[int]:
-        """Voxelizations by the best tree found on each, and what nothing was found on after.
+        """Voxelizations by the best tree found on each, or by what is to be expected.
 
         Parameters
         ----------
         found : mapping of int to float
-            Least energy by voxelization.
+            Least energy by voxelization; infinite where nothing folded.
+
+        Returns
+        -------
+        list of int
+            Those that were not tried count as if they came as near to their bound as the best of
+            the others; those on which nothing folded come last.
         """
+        floor = {
+            option: (1.0 - self.at_most(option)) * visible_faces(self.template)
+            for option in range(len(self.options))
+        }
+        weight = weights_of(self.recipe).surface
+        gaps = [found[option] - weight * floor[option] for option in found]
+        gap = min(gaps, default=0.0)
         order = self.closing_order()
-        return sorted(order, key=lambda k: (found.get(k, float("inf")), order.index(k)))
+        return sorted(order, key=lambda k: found.get(k, weight * floor[k] + gap))
 
     def at_most(self, option: int) -> float:
         """Share to which the box could be closed with a voxelization; 0 where no tree fits."""

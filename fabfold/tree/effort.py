@@ -28,8 +28,8 @@ class Effort:
     choices : int
         Sets of poses grown for each start; the one of least energy is taken.
     settling : int
-        Steps, per start, in which energy and hinges that cannot move go down together before the
-        planner is asked for the first time.
+        Steps, per start and voxel, in which energy and hinges that cannot move go down together
+        before the planner is asked for the first time.
     removals : int
         Large-neighbourhood steps, per start, until hinges that can turn join all the clusters.
     closure_tests : int
@@ -43,7 +43,7 @@ class Effort:
     kicks : int
         Most times that the best tree is shaken, settled and folded again.
     kick_steps : int
-        Steps of settling after each kick.
+        Steps of settling, per voxel, after each kick.
     kick_patience : int
         Kicks in a row without a better tree after which no more are made.
     min_removed, max_removed : int
@@ -69,14 +69,14 @@ class Effort:
     restarts: int = 3
     starts: int = 2
     choices: int = 3
-    settling: int = 1500
+    settling: int = 25
     removals: int = 6000
     closure_tests: int = 8
     planner_runs: int = 1
     polish_each: int = 300
     polish_best: int = 600
     kicks: int = 0
-    kick_steps: int = 500
+    kick_steps: int = 8
     kick_patience: int = 4
     min_removed: int = 4
     max_removed: int = 16
@@ -93,5 +93,5 @@ class Effort:
 EFFORTS: dict[str, Effort] = {
     "quick": Effort(root_poses=40, restarts=2, starts=1, polish_best=200),
     "normal": Effort(restarts=2, starts=1),
-    "thorough": Effort(root_poses=400, restarts=6, starts=3, settling=4000, polish_each=800),
+    "thorough": Effort(root_poses=400, restarts=6, starts=3, settling=60, polish_each=800),
 }

@@ -125,11 +125,11 @@ def folding_objective(voxels: int) -> FoldingObjective:
     voxels : int
         Number of voxels of the problem.
     """
-    # A hinge that cannot move must cost about as much as the energy a few joints bring; large
-    # problems need the penalty to rule, or the energy freezes before anything folds.
+    # A hinge that cannot move must cost about as much as the energy a few joints bring; in large
+    # problems more, or the energy freezes before anything folds.
     if voxels <= 72:
         return FoldingObjective(stuck_hinge=0.15, energy=1.0, joint=0.1, hot=0.15, cold=0.02)
-    return FoldingObjective(stuck_hinge=1.0, energy=0.2, joint=0.1, hot=0.1, cold=0.01)
+    return FoldingObjective(stuck_hinge=0.4, energy=1.0, joint=0.1, hot=0.15, cold=0.02)
 
 
 def steps_of_path(tree: FoldTree, path: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -235,8 +235,9 @@ class _Search:
         if best is not None:
             yield best
 
-    def settle(self, start: SearchState, steps: int, hot: float) -> SearchState | None:
+    def settle(self, start: SearchState, steps_each: int, hot: float) -> SearchState | None:
         """Lower energy and stuck hinges together, by the closure test alone."""
+        steps = steps_each * len(self.problem)
         weight = self.objective.energy
         now = self.judged(start.pose, start.energy, None, math.inf, plan=False)
         if now is None:
