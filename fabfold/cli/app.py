@@ -78,6 +78,14 @@ Effort = Annotated[
 Rounds = Annotated[
     int | None, typer.Option("--rounds", help="Rounds of seeds before giving up. Default: 8.")
 ]
+Closed = Annotated[
+    float | None,
+    typer.Option(
+        "--closed",
+        help="Search until the box is closed to this share, such as 0.85, or say it cannot be.",
+        show_default=False,
+    ),
+]
 Rotation = Annotated[
     str | None,
     typer.Option(
@@ -290,6 +298,7 @@ def _stage(name: str, summary: str) -> None:
         seed: Seed = None,
         effort: Effort = None,
         rounds: Rounds = None,
+        closed: Closed = None,
         thicken: Thicken = None,
         drop_below: DropBelow = None,
         rotation: Rotation = None,

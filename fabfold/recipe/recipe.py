@@ -63,6 +63,10 @@ class Recipe(BaseModel):
         Literal["auto", "off"] | float,
         Field(description="thin parts: auto thickens where nothing else works, off, or least mm"),
     ] = "auto"
+    closed: Annotated[
+        float | None,
+        Field(gt=0, le=1, description="search until the box is closed to this share, or give up"),
+    ] = None
     drop_below: Annotated[
         float, Field(ge=0, le=0.5, description="cells with a smaller share of material are dropped")
     ] = 0.04

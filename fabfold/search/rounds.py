@@ -18,7 +18,7 @@ from fabfold.recipe.recipe_wishes import wished
 from fabfold.search.run import Budget, Tally, executor, require_fit, run_seeds, warm_up
 from fabfold.search.saved import SeedCache
 from fabfold.search.schedule import GAIN, SEEDS_PER_ROUND, Rung, schedule
-from fabfold.search.seeds import Event, Executor, Job, SeedResult
+from fabfold.search.seeds import Batch, Event, Executor, Job, SeedResult
 from fabfold.search.voxelization_problems import VoxelizationProblems
 from fabfold.store import StageStore, stage_key
 from fabfold.tree.bound import closed_share
@@ -38,22 +38,6 @@ SEED_STRIDE = 1_000_000
 
 #: A tree that folds, and the voxels that it joins.
 Found = tuple[Voxels, Candidate]
-
-
-@dataclass(frozen=True)
-class Batch:
-    """The seeds of one round, for those who run several rounds at once.
-
-    Attributes
-    ----------
-    keys : dict of int to str
-        Seeds, and the digest of all that each one's result depends on.
-    known : dict of int to SeedResult
-        Those that are done.
-    """
-
-    keys: dict[int, str]
-    known: dict[int, SeedResult]
 
 
 @dataclass(frozen=True)
@@ -148,6 +132,47 @@ class Rounds:
         if self.seconds is not None:
             yield self.ranked(self.seconds)
             return
+        if self.recipe.closed is not None:
+            yield self._closed_to(self.recipe.closed)
+            return
+        yield from self._round_by_round()
+
+    def _closed_to(self, share: float) -> list[Found]:
+        """Trees of as many rounds as it takes until a box is closed to a share, those first.
+
+        Raises
+        ------
+        NoFoldError
+            If no voxelization allows it, or no round found one.
+        """
+        options = range(len(self.problems.options))
+        most = max(self.problems.at_most(option) for option in options)
+        if most < share:
+            raise NoFoldError(
+                f"--closed {share:g}: no box of {self.template.name} can be closed further than to "
+                f"{most:.2f} with the voxelizations of this model; take another --template or "
+                "--seed, or ask for less"
+            )
+        everything: list[Found] = []
+        for pairs in self._round_by_round():
+            everything += pairs
+            closed = [closed_share(candidate.tree) for _, candidate in everything]
+            if max(closed) >= share:
+                return sorted(
+                    everything,
+                    key=lambda pair: (
+                        closed_share(pair[1].tree) < share,
+                        pair[1].energy["total"],
+                    ),
+                )
+        best = max(closed_share(candidate.tree) for _, candidate in everything)
+        raise NoFoldError(
+            f"--closed {share:g}: the best box of {self.recipe.rounds} rounds is closed to "
+            f"{best:.2f} (at most {most:.2f} with these voxels); try more --rounds, --effort "
+            "thorough, --prefer surface, or ask for less"
+        )
+
+    def _round_by_round(self) -> Iterator[list[Found]]:
         fits = found = False
         why = ""
         for number in range(self.recipe.rounds):

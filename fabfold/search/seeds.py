@@ -14,7 +14,7 @@ from fabfold.tree.foldability import Foldability
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.solve import solve
 
-__all__ = ["Better", "Done", "Event", "Executor", "Job", "Lost", "SeedResult", "run_seed"]
+__all__ = ["Batch", "Better", "Done", "Event", "Executor", "Job", "Lost", "SeedResult", "run_seed"]
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,22 @@ class SeedResult:
     def best(self) -> float:
         """Energy of the best tree; infinite where there is none."""
         return min((c.energy["total"] for c in self.candidates), default=float("inf"))
+
+
+@dataclass(frozen=True)
+class Batch:
+    """The seeds of one round, for those who run several rounds at once.
+
+    Attributes
+    ----------
+    keys : dict of int to str
+        Seeds, and the digest of all that each one's result depends on.
+    known : dict of int to SeedResult
+        Those that are done.
+    """
+
+    keys: dict[int, str]
+    known: dict[int, SeedResult]
 
 
 @dataclass(frozen=True)
