@@ -63,8 +63,8 @@ def _rungs(
 
 
 _SCHEDULES: dict[str, tuple[Rung, ...]] = {
-    "quick": _rungs(EFFORTS["quick"], 4, (2, 1), ((2, 3),)),
-    "normal": _rungs(EFFORTS["normal"], 4, (4, 2), ((3, 6), (2, 8), (2, 8))),
+    "quick": _rungs(EFFORTS["quick"], 3, (1, 1), ((1, 4),)),
+    "normal": _rungs(EFFORTS["normal"], 4, (4, 2), ((3, 6), (2, 8))),
     "thorough": _rungs(EFFORTS["thorough"], 8, (16, 3), ((6, 20), (4, 40), (4, 40), (4, 40))),
 }
 

@@ -1,0 +1,252 @@
+"""How good the trees are and how long they take: writes benchmarks/energies.md and its plot.
+
+    python benchmarks/energies.py [NAME ...] [--effort normal] [--seed 1] [--models DIR]
+
+Each model is voxelized and searched (``fabfold fit``) in a fresh process with one worker, the
+paper's weights, single hinges and warm kernels. Seconds are processor seconds of that process.
+Beside them stand the figures of release 0.1, which were measured by the same command before the
+search was changed (``energies_before.json``). Results are kept in ``energies.json``; models that
+are named are measured again. Models of the paper and of others are looked for in ``--models``, and
+left out where they are not there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+SHARED = HERE.parents[1] / "shared" / "models"
+PLOT = HERE.parent / "docs" / "pictures" / "energy-over-time.svg"
+#: name: (source, template)
+MODELS: dict[str, tuple[str, str]] = {
+    "sample car": ("sample:car", "box-3x4x4"),
+    "sample duck": ("sample:duck", "box-4x4x4"),
+    "sample rabbit": ("sample:rabbit", "box-4x4x4"),
+    "sample elephant": ("sample:elephant", "box-4x4x4"),
+    "sample locomotive": ("sample:locomotive", "box-4x4x4"),
+    "bunny": ("paper/bunny.stl", "box-4x4x4"),
+    "kitten": ("paper/kitten.stl", "box-4x4x4"),
+    "dragon": ("paper/dragon.stl", "box-4x4x4"),
+    "car": ("paper/car.stl", "box-3x4x4"),
+    "elephant": ("paper/elephant.stl", "box-5x5x5"),
+    "u-car": ("paper/car.stl", "u-112"),
+    "airplane": ("dev/airplane.ply", "box-4x4x4"),
+    "bicycle": ("dev/bicycle.stl", "box-4x4x4"),
+    "double_torus": ("dev/double_torus.off", "box-4x4x4"),
+    "featuretype": ("dev/featuretype.step", "box-4x4x4"),
+    "idler_riser": ("dev/idler_riser.stl", "box-4x4x4"),
+    "knight": ("dev/knight.stl", "box-4x4x4"),
+    "locomotive": ("dev/locomotive.stl", "box-4x4x4"),
+    "office_chair": ("dev/office_chair.stl", "box-4x4x4"),
+    "spot": ("dev/spot.obj", "box-4x4x4"),
+    "trex": ("dev/trex.stl", "box-4x4x4"),
+}
+#: Seconds at which the plot and the table look at the best tree so far.
+MARKS = (5, 10, 20, 40, 80, 160)
+
+
+def measure(source: str, template: str, effort: str, seed: int) -> dict[str, Any]:
+    """Voxelize and search one model in this process; the row of the table."""
+    from fabfold.errors import FabfoldError
+    from fabfold.kit.kit import Kit
+    from fabfold.search import rounds
+    from fabfold.search.seeds import Better, Done
+    from fabfold.tree.bound import closed_share
+
+    curve: list[tuple[float, float, int, float]] = []
+    begin = 0.0
+
+    class Watched(rounds.Tally):
+        """Notes when each better tree came."""
+
+        def on_event(self, event: Any) -> None:
+            super().on_event(event)
+            if isinstance(event, Better | Done) and self.best is not None:
+                energy = self.best.energy["total"]
+                if not curve or energy < curve[-1][1] - 1e-9:
+                    seconds = round(time.process_time() - begin, 2)
+                    hinges, closed = len(self.best.tree.hinges), closed_share(self.best.tree)
+                    curve.append((seconds, round(energy, 3), hinges, round(closed, 4)))
+
+    rounds.Tally = Watched  # type: ignore[misc]
+    row: dict[str, Any] = {"effort": effort, "seed": seed}
+    start = time.process_time()
+    kit = Kit.from_model(source, template=template, effort=effort, seed=seed, workers=1)
+    try:
+        kit.voxelize()
+        begin = time.process_time()
+        row["cut_s"] = round(begin - start, 1)
+        planned = kit.fold()
+        row["search_s"] = round(time.process_time() - begin, 1)
+        closure = kit.box_closure(planned)
+        row |= {
+            "voxels": len(planned.tree.source),
+            "energy": round(planned.tree.energy["total"], 3),
+            "hinges": len(planned.tree.hinges),
+            "closed": round(closure.closed, 4),
+            "at_most": round(closure.at_most, 4),
+        }
+    except FabfoldError as error:
+        row["error"] = str(error)
+        row["search_s"] = round(time.process_time() - (begin or start), 1)
+    row["curve"] = curve
+    row["memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    return row
+
+
+def _key(name: str, effort: str, seed: int) -> str:
+    return f"{name}, {effort}, seed {seed}"
+
+
+def table(rows: dict[str, dict[str, Any]], before: dict[str, dict[str, Any]]) -> str:
+    """The page of results."""
+    lines = [
+        "# Trees: how good, and how long they take",
+        "",
+        "Written by `python benchmarks/energies.py`; single hinges, one worker, processor seconds.",
+        "*closed* is the share to which the box is closed, *at most* what these voxels would allow",
+        "whatever the joints. *Before* is release 0.1 at its default effort, the same models and",
+        "seeds, by the same command (`energies_before.json`); its seconds include cutting.",
+        "",
+        "| model | effort | seed | voxels | energy | before | hinges | before | closed | before "
+        "| at most | first tree s | cut s | search s | before s | MB |",
+        "|" + "---|" * 16,
+    ]
+    gains = []
+    for name in MODELS:
+        for key, row in rows.items():
+            if not key.startswith(name + ","):
+                continue
+            old = before.get(f"{name}, seed {row['seed']}", {})
+            if "error" in row:
+                lines.append(f"| {name} | {row['effort']} | {row['seed']} | {row['error']} |")
+                continue
+            cells = [name, row["effort"], row["seed"], row["voxels"], f"{row['energy']:.2f}"]
+            cells += [f"{old['energy']:.2f}" if "energy" in old else "–"]
+            cells += [row["hinges"], old.get("hinges", "–"), f"{row['closed']:.3f}"]
+            cells += [f"{old['closed']:.3f}" if "closed" in old else "–", f"{row['at_most']:.3f}"]
+            cells += [row["curve"][0][0], row["cut_s"], row["search_s"], old.get("seconds", "–")]
+            cells += [row["memory_mb"]]
+            lines.append("| " + " | ".join(map(str, cells)) + " |")
+            if row["effort"] == "normal" and "energy" in old:
+                whole = row["cut_s"] + row["search_s"]
+                gains.append((row["energy"] / old["energy"], whole / old["seconds"]))
+    if gains:
+        energy = sorted(g[0] for g in gains)[len(gains) // 2]
+        seconds = sorted(g[1] for g in gains)[len(gains) // 2]
+        better = sum(g[0] < 1 - 1e-9 for g in gains)
+        lines += [
+            "",
+            f"Normal effort against before: energy lower in {better} of {len(gains)} runs, median "
+            f"ratio {energy:.2f}; median ratio of processor seconds {seconds:.2f}.",
+        ]
+    lines += ["", "## Closed after so many seconds of the search (normal effort)", ""]
+    lines += ["| model | seed | " + " | ".join(f"{m} s" for m in MARKS) + " |"]
+    lines += ["|" + "---|" * (len(MARKS) + 2)]
+    for key, row in rows.items():
+        if row["effort"] != "normal" or "error" in row:
+            continue
+        cells = []
+        for mark in MARKS:
+            known = [point for point in row["curve"] if point[0] <= mark]
+            cells.append(f"{known[-1][3]:.2f} ({known[-1][1]:.2f})" if known else "–")
+        lines.append(f"| {key.split(',')[0]} | {row['seed']} | " + " | ".join(cells) + " |")
+    lines += [
+        "",
+        "In brackets: energy. The same as a plot: ![](../docs/pictures/" + PLOT.name + ")",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def plot(rows: dict[str, dict[str, Any]]) -> str:
+    """Closed share over processor seconds of the search, as SVG."""
+    import math
+
+    width, height, left, low = 760, 420, 50, 380
+    top = 20
+
+    def x_of(seconds: float) -> float:
+        return left + (width - left - 130) * math.log(max(seconds, 0.5) / 0.5) / math.log(400)
+
+    def y_of(closed: float) -> float:
+        return low - (low - top) * (closed - 0.2) / 0.8
+
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
+        'font-family="system-ui, sans-serif" font-size="12">',
+        f'<rect width="{width}" height="{height}" fill="#fff"/>',
+    ]
+    for mark in (1, *MARKS):
+        x = x_of(mark)
+        parts.append(f'<path d="M{x:.1f} {top}V{low}" stroke="#ddd"/>')
+        parts.append(f'<text x="{x:.1f}" y="{low + 16}" text-anchor="middle">{mark}</text>')
+    for closed in (0.2, 0.4, 0.6, 0.8, 1.0):
+        y = y_of(closed)
+        parts.append(f'<path d="M{left} {y:.1f}H{width - 130}" stroke="#ddd"/>')
+        parts.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{closed:.1f}</text>')
+    parts.append(
+        f'<text x="{(left + width - 130) / 2}" y="{height - 6}" text-anchor="middle">'
+        "processor seconds of the search (normal effort); share to which the box is closed</text>"
+    )
+    shown = [(k.split(",")[0], r) for k, r in rows.items() if r["effort"] == "normal"]
+    shown = [(name, row) for name, row in shown if row["curve"] and row["seed"] == 1]
+    for place, (name, row) in enumerate(shown):
+        colour = f"hsl({(place * 137) % 360} 60% 42%)"
+        steps = ""
+        for seconds, _, _, closed in row["curve"]:
+            x, y = x_of(seconds), y_of(closed)
+            steps += f"M{x:.1f} {y:.1f}" if not steps else f"H{x:.1f}V{y:.1f}"
+        steps += f"H{x_of(row['search_s']):.1f}"
+        parts.append(f'<path d="{steps}" fill="none" stroke="{colour}" stroke-width="1.6"/>')
+        y = top + 14 + 17 * place
+        parts.append(f'<text x="{width - 118}" y="{y}" fill="{colour}">{name}</text>')
+    return "\n".join([*parts, "</svg>"]) + "\n"
+
+
+def main() -> int:
+    """Measure, and write the page and the plot."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--effort", default="normal")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--models", type=Path, default=SHARED)
+    parser.add_argument("--one", nargs=2, metavar=("SOURCE", "TEMPLATE"), help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        print(json.dumps(measure(*options.one, options.effort, options.seed)))
+        return 0
+    kept, old = HERE / "energies.json", HERE / "energies_before.json"
+    rows = json.loads(kept.read_text("utf-8")) if kept.is_file() else {}
+    before = json.loads(old.read_text("utf-8")) if old.is_file() else {}
+    for name, (source, template) in MODELS.items():
+        key = _key(name, options.effort, options.seed)
+        path = source if source.startswith("sample:") else str(options.models / source)
+        here = source.startswith("sample:") or Path(path).is_file()
+        if not here or (name not in options.names if options.names else key in rows):
+            continue
+        call = [sys.executable, __file__, "--one", path, template]
+        call += ["--effort", options.effort, "--seed", str(options.seed)]
+        done = subprocess.run(call, capture_output=True, text=True, check=False)
+        if done.returncode:
+            print(f"{key}: {done.stderr[-500:]}", file=sys.stderr)
+            continue
+        # Another run may have written meanwhile.
+        rows = json.loads(kept.read_text("utf-8")) if kept.is_file() else {}
+        rows[key] = json.loads(done.stdout)
+        kept.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        told = {k: v for k, v in rows[key].items() if k != "curve"}
+        print(key, told, flush=True)
+    (HERE / "energies.md").write_text(table(rows, before), encoding="utf-8")
+    PLOT.write_text(plot(rows), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
