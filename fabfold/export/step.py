@@ -228,14 +228,27 @@ def _brep(body: BodyMesh, axes: list[Axis], level: str, thin_mm: float) -> Brep:
 
 def _measured(text: str) -> tuple[bool, float]:
     """Whether the CAD kernel reads one valid solid, and its volume in mm³."""
-    from build123d import import_step
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+    from OCP.IFSelect import IFSelect_ReturnStatus
+    from OCP.STEPControl import STEPControl_Reader
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
 
+    reader = STEPControl_Reader()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "body.step"
         path.write_text(text, encoding="ascii")
-        solids = import_step(path).solids()
-    if len(solids) != 1:
-        return False, float(sum(solid.volume for solid in solids))
-    (solid,) = solids
-    valid = solid.is_valid  # a method before build123d 0.11
-    return bool(valid() if callable(valid) else valid), float(solid.volume)
+        if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+            return False, 0.0
+        reader.TransferRoots()
+    solids, volume = [], 0.0
+    explorer = TopExp_Explorer(reader.OneShape(), TopAbs_ShapeEnum.TopAbs_SOLID)
+    while explorer.More():
+        solids.append(explorer.Current())
+        measured = GProp_GProps()
+        BRepGProp.VolumeProperties_s(solids[-1], measured)
+        volume += measured.Mass()
+        explorer.Next()
+    return len(solids) == 1 and BRepCheck_Analyzer(solids[0]).IsValid(), volume

@@ -99,8 +99,9 @@ def _refs(numbers: Sequence[int]) -> str:
 
 def _square_to(normal: Sequence[float]) -> tuple[float, float, float]:
     """Some unit vector square to `normal`, along a lattice axis where that can be."""
-    least = int(np.abs(np.asarray(normal)).argmin())
-    x, y, z = np.cross(normal, np.eye(3)[least])
+    a, b, c = (float(value) for value in normal)
+    least = min(range(3), key=lambda axis: abs((a, b, c)[axis]))
+    x, y, z = ((0.0, c, -b), (-c, 0.0, a), (b, -a, 0.0))[least]
     length = math.sqrt(x * x + y * y + z * z)
     return (x / length, y / length, z / length)
 

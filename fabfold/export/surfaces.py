@@ -140,26 +140,34 @@ def flat_regions(
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     sliver = doubled < FLAT_MM * longest
     beside = _neighbours(faces).tolist()
-    labels = np.full(len(faces), -1, dtype=np.int32)
-    planes: list[Plane] = []
+    # Plain numbers: arrays of three cost more to call than to add up.
+    corner_of, normal_of, is_sliver = corners.tolist(), normals.tolist(), sliver.tolist()
+    labels = [-1] * len(faces)
+    regions: list[list[int]] = []
     for seed in np.argsort(-np.round(doubled, 9), kind="stable").tolist():
         if labels[seed] >= 0:
             continue
-        label = len(planes)
-        point, normal = corners[seed, 0], normals[seed]
+        label = len(regions)
+        nx, ny, nz = normal_of[seed]
+        px, py, pz = corner_of[seed][0]
         labels[seed] = label
-        queue = deque([seed])
-        while queue:
-            for other in beside[queue.popleft()]:
+        region = [seed]
+        for here in region:  # grows while it is gone through
+            for other in beside[here]:
                 if labels[other] >= 0:
                     continue
-                if not sliver[other] and normals[other] @ normal < 0.9:
+                ox, oy, oz = normal_of[other]
+                if not is_sliver[other] and ox * nx + oy * ny + oz * nz < 0.9:
                     continue
-                if np.abs((corners[other] - point) @ normal).max() < FLAT_MM:
+                for x, y, z in corner_of[other]:
+                    if abs((x - px) * nx + (y - py) * ny + (z - pz) * nz) >= FLAT_MM:
+                        break
+                else:
                     labels[other] = label
-                    queue.append(other)
-        planes.append(_plane(corners[labels == label], normal))
-    return labels, planes
+                    region.append(other)
+        regions.append(region)
+    planes = [_plane(corners[sorted(region)], normals[region[0]]) for region in regions]
+    return np.array(labels, dtype=np.int32), planes
 
 
 def _plane(corners: NDArray[np.float64], normal: NDArray[np.float64]) -> Plane:
@@ -201,8 +209,10 @@ def _strip(
     if np.ptp(radius) < ROUND_MM:
         fit = (float((radius.min() + radius.max()) / 2), 0.0)
     else:
-        slope, at_zero = np.polyfit(height, radius, 1)
-        fit = (float(at_zero), float(slope))
+        middle_height, middle_radius = height.mean(), radius.mean()
+        lever = height - middle_height
+        slope = float(lever @ (radius - middle_radius) / (lever @ lever))
+        fit = (float(middle_radius - slope * middle_height), slope)
         if np.abs(radius - (fit[0] + fit[1] * height)).max() > ROUND_MM or abs(slope) > 20:
             return None
     along = axis.direction
@@ -296,13 +306,40 @@ def _strips(
     strips: Strips = {}
     for index, axis in enumerate(axes):
         near = _regions_near(vertices, faces, labels, axis)
-        for region in near:
-            if region in strips:
-                continue
+        near = [region for region in near if region not in strips]
+        for region in _narrow(vertices, near, corners_of, axis):
             found = _strip(vertices[corners_of[region]], np.asarray(planes[region].normal), axis)
             if found is not None:
                 strips[region] = (index, *found)
     return strips
+
+
+def _narrow(
+    vertices: NDArray[np.float64],
+    regions: list[int],
+    corners_of: list[NDArray[np.int32]],
+    axis: Axis,
+) -> list[int]:
+    """Those regions that are within an axis' reach and not flat along it: most are sorted out."""
+    if not regions:
+        return []
+    first = np.cumsum([0, *(len(corners_of[region]) for region in regions[:-1])])
+    points = vertices[np.concatenate([corners_of[region] for region in regions])]
+    radius, angle, height = _polar(points, axis)
+    widest = np.maximum.reduceat(radius, first)
+    top, bottom = np.maximum.reduceat(height, first), np.minimum.reduceat(height, first)
+    good = (widest <= axis.radius) & (np.maximum(np.abs(top), np.abs(bottom)) <= axis.half_length)
+    good &= (widest >= 10 * ROUND_MM) & (top - bottom >= 10 * ROUND_MM)
+    # A strip is narrow, and not square to the axis.
+    far = radius > 10 * ROUND_MM
+    counts = np.diff([*first, len(points)])
+    place = np.where(far, np.arange(len(points)), len(points))
+    origin = np.minimum(np.minimum.reduceat(place, first), len(points) - 1)
+    turn = np.angle(np.exp(1j * (angle - np.repeat(angle[origin], counts))))
+    most = np.maximum.reduceat(np.where(far, turn, -np.inf), first)
+    span = most - np.minimum.reduceat(np.where(far, turn, np.inf), first)
+    good &= (span <= np.radians(12.0)) & (span >= 1e-3)
+    return [region for region, fits in zip(regions, good.tolist(), strict=True) if fits]
 
 
 Rims = dict[tuple[int, int], list[tuple[int, int]]]

@@ -1,6 +1,8 @@
 """The built-in samples by name, and models from a sample or a file.
 
-A sample is a model drawn with build123d, to fold without a file at hand.
+A sample is a model drawn with build123d, to fold without a file at hand. Drawing takes the kernel
+ten seconds, so the mesh of each comes with the package; ``python -m fabfold.samples.builtin``
+draws them again.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fabfold.errors import GeometryError, ModelError
+from fabfold.files import write_npz
 from fabfold.solid.closed_solid import Solid
 
 if TYPE_CHECKING:
@@ -24,6 +27,7 @@ __all__ = [
     "PREFIX",
     "Sample",
     "build_sample",
+    "draw_meshes",
     "load_model",
     "load_sample",
     "mesh_sample",
@@ -151,7 +155,24 @@ def load_sample(name: str) -> Solid:
     ModelError
         If there is no such sample.
     """
-    return mesh_sample(build_sample(name), sample(name))
+    known = sample(name)
+    with np.load(_mesh_file(name), allow_pickle=False) as data:
+        return Solid(name, data["vertices"], data["faces"], (), _digest(known))
+
+
+def _mesh_file(name: str) -> Path:
+    return Path(__file__).parent / "meshes" / f"{name}.npz"
+
+
+def _digest(known: Sample) -> str:
+    return hashlib.sha256(f"sample:{known.name}:{known.version}".encode()).hexdigest()
+
+
+def draw_meshes() -> None:
+    """Draw all samples, and write the meshes that come with the package."""
+    for name in sample_names():
+        solid = mesh_sample(build_sample(name), sample(name))
+        write_npz(_mesh_file(name), {"vertices": solid.vertices, "faces": solid.faces})
 
 
 def load_model(source: str | Path) -> Solid:
@@ -201,6 +222,9 @@ def mesh_sample(part: build123d.Part, known: Sample) -> Solid:
 
     size = part.bounding_box().size
     vertices, faces = tessellate(part, max(size.X, size.Y, size.Z))
-    digest = hashlib.sha256(f"sample:{known.name}:{known.version}".encode()).hexdigest()
     # Rounded, since the kernel's last digits mean nothing and may differ between processors.
-    return solid_from_mesh(known.name, RawMesh(np.round(vertices, 9), faces), digest)
+    return solid_from_mesh(known.name, RawMesh(np.round(vertices, 9), faces), _digest(known))
+
+
+if __name__ == "__main__":
+    draw_meshes()
