@@ -198,10 +198,6 @@ def _strip(
 ) -> tuple[float, float, bool] | None:
     """Radius at the axis' point, slope and side of the surface that a flat strip stands for."""
     radius, angle, height = _polar(points, axis)
-    if radius.max() > axis.radius or np.abs(height).max() > axis.half_length:
-        return None
-    if radius.max() < 10 * ROUND_MM or np.ptp(height) < 10 * ROUND_MM:
-        return None
     far = radius > 10 * ROUND_MM
     turn = np.angle(np.exp(1j * (angle[far] - angle[far][0])))
     if np.ptp(turn) > np.radians(12.0) or np.ptp(turn) < 1e-3:
@@ -320,7 +316,7 @@ def _narrow(
     corners_of: list[NDArray[np.int32]],
     axis: Axis,
 ) -> list[int]:
-    """Those regions that are within an axis' reach and not flat along it: most are sorted out."""
+    """Regions within an axis' reach and not flat along it; :func:`_strip` asks no more of these."""
     if not regions:
         return []
     first = np.cumsum([0, *(len(corners_of[region]) for region in regions[:-1])])

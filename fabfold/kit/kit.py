@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from fabfold.kit.early import EarlyKit
     from fabfold.printing.checks import Check
     from fabfold.printing.profiles import Profile
+    from fabfold.search.kernels import KernelCompiler
     from fabfold.search.pareto import Solution
     from fabfold.search.rounds import Found, Rounds
     from fabfold.solid.closed_solid import Solid
@@ -63,13 +64,6 @@ class Kit:
         Address of a Dask scheduler, whose workers search instead. Changes no result.
     seconds : float or None
         Search for so long and take the best that was found; depends on the machine's speed.
-
-    Examples
-    --------
-    >>> from fabfold.kit.kit import Kit
-    >>> kit = Kit.from_model("sample:car", seed=1)
-    >>> kit.recipe.template
-    'box-3x4x4'
     """
 
     def __init__(
@@ -101,6 +95,7 @@ class Kit:
         self._store = StageStore(folder)
         self._results: dict[str, Any] = {}
         self._early: EarlyKit | None = None
+        self._compiler: KernelCompiler | None = None
         self._template_file = template
         self._template: Template = load_target(recipe.template, template, recipe.template_cells)
         if recipe.joints_inside:
@@ -335,8 +330,13 @@ class Kit:
         on_first: Callable[[Found], None] | None = None,
     ) -> Rounds:
         """Search of the kit's voxelizations for its recipe, or one with another preference."""
+        from fabfold.search.kernels import KernelCompiler
         from fabfold.search.rounds import Rounds
 
+        # With one worker everything happens in this process, and what is called is compiled.
+        if self._compiler is None and self.workers != 1 and self.scheduler is None:
+            self._compiler = KernelCompiler()
+            self._compiler.start()
         return Rounds(
             recipe,
             self._template,
@@ -350,6 +350,7 @@ class Kit:
             wishes=self.wishes(),
             shift=shift,
             on_first=on_first,
+            compiler=self._compiler,
         )
 
     def _mark(self) -> list[Any]:

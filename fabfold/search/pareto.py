@@ -182,6 +182,7 @@ def _round(
                     yield seed, ladder[step].job(number, seed)
 
         with open_progress(f"pareto-{number}") as progress:
+            ladder[0].wait_for_kernels(progress)
             tally = Tally(progress, results, lambda done: done / len(owner), len(owner))
 
             def on_event(event: Event) -> None:

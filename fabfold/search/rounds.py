@@ -15,6 +15,7 @@ from fabfold.lattice.template import Template
 from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
 from fabfold.recipe.recipe_wishes import wished
+from fabfold.search.kernels import KernelCompiler
 from fabfold.search.run import Budget, Tally, executor, require_fit, run_seeds, warm_up
 from fabfold.search.saved import SeedCache
 from fabfold.search.schedule import GAIN, SEEDS_PER_ROUND, Rung, schedule
@@ -82,6 +83,8 @@ class Rounds:
         Added to the number of each seed, for searches that run beside one another.
     on_first : callable, optional
         Told of the first tree that folds, with its voxels, as soon as its rung is done.
+    compiler : KernelCompiler, optional
+        Compiles the kernels beside what comes before; the search waits for it.
     """
 
     def __init__(
@@ -99,6 +102,7 @@ class Rounds:
         wishes: Wishes | None = None,
         shift: int = 0,
         on_first: Callable[[Found], None] | None = None,
+        compiler: KernelCompiler | None = None,
     ) -> None:
         self.recipe = recipe
         self.template = template
@@ -112,6 +116,7 @@ class Rounds:
         self._cache = SeedCache(store)
         self._open_progress = open_progress
         self._on_first = on_first
+        self._compiler = compiler
         self._option_of: dict[int, int] = {}
         self._origin: dict[int, int] = {}
         self._done: dict[int, list[Found]] = {}
@@ -243,6 +248,7 @@ class Rounds:
                 results |= held
             return results
         with self._open_progress("fit") as progress:
+            self.wait_for_kernels(progress)
             budget = Budget(seconds)
             tally = Tally(progress, {}, lambda _done: budget.share, describe=self.describe)
             with executor(self.workers, self.scheduler, rounds, budget.over) as pool:
@@ -257,6 +263,11 @@ class Rounds:
         tally.check_failures()
         return results
 
+    def wait_for_kernels(self, progress: Progress) -> None:
+        """Wait until the kernels are compiled, where that goes on beside."""
+        if self._compiler is not None:
+            self._compiler.wait(progress)
+
     def _searchable(self, results: Mapping[int, SeedResult]) -> bool:
         """Whether any voxelization that was looked at can be searched at all."""
         return any(result.fits for result in results.values())
@@ -269,6 +280,7 @@ class Rounds:
         results = whole
         if not self._is_complete(number, whole):
             with self._open_progress(f"fit-{number}") as progress:
+                self.wait_for_kernels(progress)
                 total = sum(rung.seeds for rung in self._rungs(number))
                 tally = Tally(progress, {}, lambda done: done / total, total, self.describe)
                 forever = Budget()

@@ -1,0 +1,189 @@
+"""The search's kernels, compiled once an installation by two processes into one cache.
+
+numba compiles a kernel when it is first called and keeps it beside the source. Without help the
+program itself and each worker would compile the same kernels side by side. So where they are not
+there yet, two processes compile a half each, those of the tree and those of folding, while the
+model is read and cut; the search begins when they are done.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from fabfold.progress import Progress
+
+__all__ = ["HALVES", "KernelCompiler", "compile_half", "kernel_stamp"]
+
+#: What the processes compile.
+HALVES = ("tree", "fold")
+#: Seconds between looks at the processes.
+_TICK = 0.2
+#: Packages whose sources the kernels are made of.
+_PACKAGES = ("fold", "lattice", "tree")
+
+
+def kernel_stamp() -> Path:
+    """File that is there once the kernels of these sources are compiled for this machine."""
+    import numba
+    from numba.core import config
+
+    root = Path(__file__).resolve().parents[1]
+    digest = hashlib.sha256(
+        f"{numba.__version__} {sys.version} {platform.machine()} {os.cpu_count()}".encode()
+    )
+    for package in _PACKAGES:
+        for path in sorted((root / package).glob("*.py")):
+            about = path.stat()
+            digest.update(f"{path.name} {about.st_size} {about.st_mtime_ns}".encode())
+    folder = Path(config.CACHE_DIR) if config.CACHE_DIR else root / "tree" / "__pycache__"
+    if not os.access(folder if folder.exists() else folder.parent, os.W_OK):
+        folder = Path.home() / ".cache" / "fabfold"
+    return folder / f"kernels-{digest.hexdigest()[:16]}.stamp"
+
+
+class KernelCompiler:
+    """Processes that compile what is missing; none where everything is there.
+
+    Examples
+    --------
+    >>> compiler = KernelCompiler()
+    >>> compiler.start()  # goes on beside what follows
+    >>> compiler.close()
+    """
+
+    def __init__(self) -> None:
+        self._stamp = kernel_stamp()
+        self._running: list[subprocess.Popen[bytes]] = []
+
+    def start(self) -> None:
+        """Begin, unless the kernels are there or it has begun already."""
+        if self._running or self._stamp.exists():
+            return
+        # A script of the user's is not read again, as the start of a worker would do.
+        environment = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+            # LLVM's first level makes kernels as fast as its third, in two thirds of the time.
+            "NUMBA_OPT": os.environ.get("NUMBA_OPT", "1"),
+        }
+        for half in HALVES:
+            call = [sys.executable, "-m", "fabfold.search.kernels", half]
+            self._running.append(
+                subprocess.Popen(
+                    call, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+                )
+            )
+
+    def wait(self, progress: Progress) -> None:
+        """Wait until all is compiled.
+
+        A process that fails is no matter: who needs a kernel that is missing compiles it.
+
+        Parameters
+        ----------
+        progress : Progress
+            Is told what is being waited for.
+        """
+        if not self._running:
+            return
+        try:
+            while any(process.poll() is None for process in self._running):
+                done = sum(process.poll() is not None for process in self._running)
+                progress.update(
+                    None,
+                    "compiling the search's kernels, once an installation: "
+                    f"{done} of {len(HALVES)} parts",
+                )
+                time.sleep(_TICK)
+            if all(process.returncode == 0 for process in self._running):
+                self._write_stamp()
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """End what still runs."""
+        for process in self._running:
+            if process.poll() is None:
+                process.terminate()
+            process.wait()
+        self._running.clear()
+
+    def _write_stamp(self) -> None:
+        try:
+            self._stamp.parent.mkdir(parents=True, exist_ok=True)
+            for old in self._stamp.parent.glob("kernels-*.stamp"):
+                old.unlink()
+            self._stamp.touch()
+        except OSError:
+            return  # Then the next run looks again; that costs it some seconds.
+
+
+def compile_half(half: str) -> None:
+    """Compile one half of the kernels in this process, by using them.
+
+    Parameters
+    ----------
+    half : str
+        One of :data:`HALVES`.
+    """
+    if half == "tree":
+        _search_without_folding()
+    else:
+        _fold_a_strip()
+
+
+def _fold_a_strip() -> None:
+    """Test, plan and shorten the folding of a strip of four cells, zigzag."""
+    from fabfold.fold.lattice_foldability import LatticeFoldability
+    from fabfold.tree.system import HingeSystem
+
+    strip = HingeSystem(
+        cells=np.array([(i, 0, 0) for i in range(4)], np.int32),
+        body=np.arange(4, dtype=np.int32),
+        parent=np.arange(3, dtype=np.int32),
+        point2=np.array([(1, 0, 1), (3, 0, -1), (5, 0, 1)], np.int32),
+        axis=np.array([1, 1, 1], np.int8),
+        turns=np.array([-2, 2, -2], np.int8),
+    )
+    judge = LatticeFoldability()
+    judge.stuck_hinges(strip)
+    found = judge.estimate(strip, 40)
+    judge.path(strip, found.guide)
+
+
+def _search_without_folding() -> None:
+    """Search the strip of the warm-up with a judge to whom everything folds."""
+    from dataclasses import replace
+
+    from fabfold.search.warmup import warm_up_job
+    from fabfold.tree.foldability import PlannerEstimate
+    from fabfold.tree.solve import solve
+    from fabfold.tree.system import HingeSystem
+
+    class Yes:
+        def stuck_hinges(self, system: HingeSystem) -> np.ndarray:
+            return np.zeros((2, len(system.parent)), np.bool_)
+
+        def estimate(
+            self, system: HingeSystem, expansions: int, guide: np.ndarray | None = None
+        ) -> PlannerEstimate:
+            none = np.zeros((0, 5), np.int32) if guide is None else guide
+            return PlannerEstimate(np.zeros(len(system.parent), np.int32), none)
+
+        def path(self, system: HingeSystem, guide: np.ndarray | None = None) -> np.ndarray:
+            return np.stack([np.arange(len(system.parent)), system.turns], axis=1).astype(np.int32)
+
+    job = warm_up_job()
+    solve(job.problem, 1, Yes(), replace(job.effort, kicks=1))
+
+
+if __name__ == "__main__":
+    compile_half(sys.argv[1])
