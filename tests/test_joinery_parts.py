@@ -14,8 +14,15 @@ from fabfold.joinery.barrel_sweeps import Sweep, barrel_sweeps, descendants
 from fabfold.joinery.cells import as_manifold, eroded_cells, occupancy
 from fabfold.joinery.grooves import groove_tools
 from fabfold.joinery.hinge_placement import hinge_frames
-from fabfold.joinery.soundness import mesh_faults, piece_count, printable_body, stl_mesh
+from fabfold.joinery.soundness import (
+    crossing_triangles,
+    mesh_faults,
+    piece_count,
+    printable_body,
+    stl_mesh,
+)
 from fabfold.lattice.rotations import rotation_about
+from fabfold.meshes import mesh_volume
 
 CELLS = {
     "one": [[0, 0, 0]],
@@ -214,3 +221,20 @@ def test_body_that_touches_itself_is_nicked_apart():
     assert solid.volume() == pytest.approx(body.volume(), rel=1e-3)
     with pytest.raises(GeometryError, match="nothing is left"):
         printable_body(manifold3d.Manifold(), "body-00", np.zeros(3))
+
+
+def test_slivers_that_cross_once_they_are_rounded_are_collapsed():
+    # Cylinders that all but coincide leave slivers of micrometres.
+    rng = np.random.default_rng(2)
+    parts = []
+    for _ in range(12):
+        tilt, shift = rng.uniform(-0.2, 0.2, 3).tolist(), rng.uniform(-0.004, 0.004, 3).tolist()
+        turned = manifold3d.Manifold.cylinder(10.0, 3.0, 3.0, 64).rotate(tuple(tilt))
+        parts.append(turned.translate(tuple(shift)))
+    solid = manifold3d.Manifold.batch_boolean(parts, manifold3d.OpType.Add)
+    origin = np.array([3000.0, 3000.0, 3000.0])  # where single precision is coarse
+    rough = solid.as_original().simplify(0.001).translate(tuple(origin)).to_mesh64()
+    assert len(crossing_triangles(*stl_mesh(rough.vert_properties[:, :3], rough.tri_verts))) > 0
+    vertices, faces = printable_body(solid, "body", origin)
+    assert len(crossing_triangles(vertices, faces)) == 0
+    assert mesh_volume(vertices, faces) == pytest.approx(solid.volume(), rel=1e-3)

@@ -17,7 +17,7 @@ from fabfold.meshes import compact, weld
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["mesh_faults", "piece_count", "printable_body", "stl_mesh"]
+__all__ = ["crossing_triangles", "mesh_faults", "piece_count", "printable_body", "stl_mesh"]
 
 #: Flat faces are merged and short edges collapsed up to this deviation.
 SIMPLIFY_MM = 0.001
@@ -104,6 +104,31 @@ def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDAr
     return np.stack([split, split], axis=1)
 
 
+def crossing_triangles(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32]
+) -> NDArray[np.int64]:
+    """Triangles of a mesh that cross others, as MeshLab finds them.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+        Corners of the mesh.
+    faces : (f, 3) int32 array
+        Triangles as indices into `vertices`.
+
+    Returns
+    -------
+    (k,) int64 array
+        Their indices; empty for a surface that is a plain solid's.
+    """
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(faces)))
+    meshes.compute_selection_by_self_intersections_per_face()
+    return np.flatnonzero(meshes.current_mesh().face_selection_array()).astype(np.int64)
+
+
 def piece_count(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> int:
     """Number of pieces of a mesh that are connected along edges.
 
@@ -136,7 +161,8 @@ def printable_body(
 
     Flat faces are merged, the body is moved to its place, and the mesh is made a closed
     two-manifold as an STL reader will see it: where the body touches itself in a point or along an
-    edge, a nick of a tenth of a millimetre parts the two sides.
+    edge, a nick of a tenth of a millimetre parts the two sides. Where triangles cross, as slivers
+    do once they are rounded, edges of up to some hundredths of a millimetre are collapsed too.
 
     Parameters
     ----------
@@ -157,7 +183,7 @@ def printable_body(
     Raises
     ------
     GeometryError
-        If no closed two-manifold single piece comes out.
+        If no closed two-manifold single piece that does not cross itself comes out.
     """
     import manifold3d
 
@@ -172,7 +198,12 @@ def printable_body(
             pieces = piece_count(vertices, faces)
             if pieces != 1:
                 raise GeometryError(f"{name}: falls into {pieces} pieces when it is written")
-            return vertices, faces
+            crossing = crossing_triangles(vertices, faces)
+            if len(crossing) == 0:
+                return vertices, faces
+            # Slivers a few micrometres high, which rounding has tipped into each other.
+            current = current.simplify(SIMPLIFY_MM * 2.0 ** (attempt + 1))
+            continue
         half = _NICK_MM * (1.0 + 0.5 * attempt) / 2.0
         ends = vertices[faults] - origin_mm
         nicks = [
@@ -183,6 +214,12 @@ def printable_body(
             [current, *nicks], manifold3d.OpType.Subtract
         ).decompose()
         current = max(parts, key=lambda part: part.volume()).as_original().simplify(SIMPLIFY_MM)
+    if len(faults) == 0:
+        raise GeometryError(
+            f"{name}: {len(crossing)} triangles of its surface cross others, first near "
+            f"{np.round(vertices[faces[crossing[0], 0]], 2).tolist()} mm; another voxel size may "
+            "help"
+        )
     raise GeometryError(
         f"{name}: touches itself at {len(faults)} points, "
         f"first near {np.round(vertices[faults[0]], 2).tolist()} mm; another voxel size may help"
