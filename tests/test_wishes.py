@@ -19,7 +19,7 @@ from fabfold.lattice.rotations import FACES, ROTATIONS, rotation_about
 from fabfold.lattice.shipped import load_template
 from fabfold.recipe.recipe import make_recipe
 from fabfold.recipe.recipe_wishes import default_weights, make_wishes, weights_of, wished
-from fabfold.search.rounds import _usable
+from fabfold.search.voxelization_problems import usable
 from fabfold.solid.load import load_solid, solid_from_mesh
 from fabfold.solid.raw import RawMesh
 from fabfold.solid.regions import (
@@ -295,7 +295,7 @@ def test_edges_inside_a_template():
 def test_hinges_inside_need_a_cell_to_spare():
     voxels = cut(bar(), "box-4x4x2")
     with pytest.raises(NoTreeError, match="needs an empty cell beside it"):
-        _usable([voxels], replace(load_template("box-4x4x2"), joints="inside"), Wishes())
+        usable([voxels], replace(load_template("box-4x4x2"), joints="inside"), Wishes())
 
 
 def test_template_file_with_hinges_inside(tmp_path):

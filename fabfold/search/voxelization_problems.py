@@ -19,7 +19,7 @@ from fabfold.voxels.voxel_model import Voxels
 from fabfold.wishes.protect import rank_by_cuts, rigid_pairs
 from fabfold.wishes.wish_list import Wishes
 
-__all__ = ["VoxelizationProblems", "search_order"]
+__all__ = ["VoxelizationProblems", "search_order", "usable"]
 
 
 def search_order(options: Sequence[Voxels]) -> list[Voxels]:
@@ -32,8 +32,22 @@ def search_order(options: Sequence[Voxels]) -> list[Voxels]:
     return ordered[0::2] + ordered[1::2]
 
 
-def _usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> list[Voxels]:
+def usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> list[Voxels]:
     """Voxelizations in which the wishes can come true, in their order of search.
+
+    Parameters
+    ----------
+    options : sequence of Voxels
+        Voxelizations.
+    template : Template
+        The target shape, as it is filled.
+    wishes : Wishes
+        Of the recipe.
+
+    Returns
+    -------
+    list of Voxels
+        From the fewest voxels on; with ``--protect``, by cuts.
 
     Raises
     ------
@@ -102,7 +116,7 @@ class VoxelizationProblems:
         self, recipe: Recipe, template: Template, options: Sequence[Voxels], wishes: Wishes
     ) -> None:
         self.recipe, self.template, self.wishes = recipe, template, wishes
-        self.options = _usable(options, template, wishes)
+        self.options = usable(options, template, wishes)
         self._jobs: dict[int, Job | SeedResult] = {}
         self._at_most: dict[int, float] = {}
         self._closing: list[int] | None = None
