@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import pickle
+import signal
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
-from fabfold.errors import FabfoldError
 from fabfold.fold.motion import motion_of
 from fabfold.kit.stages import PlannedTree, build
 from fabfold.printing.profiles import Profile
@@ -14,16 +18,16 @@ from fabfold.recipe.recipe import Recipe
 from fabfold.search.rounds import Found
 from fabfold.tree.bound import closed_share
 
-__all__ = ["EarlyKit"]
+__all__ = ["EarlyKit", "write_early"]
 
 
 class EarlyKit:
-    """Builds and writes a first tree beside the search, in a thread of its own.
+    """Builds and writes a first tree beside the search, in a process of its own.
 
-    The search runs in processes of its own or in compiled kernels, so the thread takes little from
-    it. What is written is what a printer needs and the proof that it folds: ``tree.json``,
-    ``motion.json`` with its certificate, the bodies and the 3MF. Everything is replaced by the
-    final kit. Where the tree cannot be built, nothing is written.
+    A thread only waits for it: MeshLab, which looks at the bodies, may not be used in a thread that
+    is not the first. What is written is what a printer needs and the proof that it folds:
+    ``tree.json``, ``motion.json`` with its certificate, the bodies and the 3MF. Everything is
+    replaced by the final kit. Where the tree cannot be built, nothing is written.
 
     Parameters
     ----------
@@ -59,15 +63,48 @@ class EarlyKit:
             self._thread.join()
 
     def _make(self, planned: PlannedTree) -> None:
-        from fabfold.kit.writing import write_printable
+        work = pickle.dumps((planned, self._profile, self._recipe, self._folder))
+        # A script of the user's is not read again, as the start of a worker would do.
+        path = os.pathsep.join(part for part in sys.path if part)
+        with self._listener.stage("early") as progress:
+            done = subprocess.run(
+                [sys.executable, "-m", "fabfold.kit.early"],
+                input=work,
+                env={**os.environ, "PYTHONPATH": path},
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                check=False,
+            )
+            if done.returncode:
+                # The bodies of this tree do not come out; the search has others.
+                progress.update(1.0, "its bodies do not come out; going on without")
+                return
+            hinges, closed = len(planned.tree.hinges), 100 * closed_share(planned.tree)
+            text = f"{hinges} hinges, box closed to {closed:.0f} %; better ones replace it"
+            progress.update(1.0, text)
 
-        recipe = self._recipe
-        try:
-            with self._listener.stage("early") as progress:
-                built = build(planned, self._profile, recipe.voxel_mm, (), progress)
-                write_printable(self._folder, recipe, self._profile, built)
-                hinges, closed = len(planned.tree.hinges), 100 * closed_share(planned.tree)
-                text = f"{hinges} hinges, box closed to {closed:.0f} %; better ones replace it"
-                progress.update(1.0, text)
-        except FabfoldError:
-            return  # The bodies of this tree do not come out; the search has others.
+
+def write_early(work: bytes) -> None:
+    """Build and write what :class:`EarlyKit` asks for.
+
+    Parameters
+    ----------
+    work : bytes
+        Pickle of the planned tree, the profile, the recipe and the folder.
+
+    Raises
+    ------
+    GeometryError, CheckError
+        If the bodies do not come out.
+    """
+    from fabfold.kit.writing import write_printable
+    from fabfold.progress import SilentProgress
+
+    planned, profile, recipe, folder = pickle.loads(work)
+    built = build(planned, profile, recipe.voxel_mm, (), SilentProgress())
+    write_printable(folder, recipe, profile, built)
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    write_early(sys.stdin.buffer.read())
