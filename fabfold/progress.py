@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Protocol
 
-__all__ = ["Listener", "Progress", "SilentListener", "SilentProgress"]
+__all__ = ["Listener", "Progress", "SilentListener", "SilentProgress", "processor_seconds"]
+
+
+def processor_seconds() -> float:
+    """Processor seconds of this process and of those that it started and that have ended."""
+    spent = os.times()
+    return spent.user + spent.system + spent.children_user + spent.children_system
 
 
 class Progress(Protocol):

@@ -6,6 +6,7 @@ Whoever changes a kit copies its folder. Imports stand inside the fixtures, sinc
 
 from __future__ import annotations
 
+import fcntl
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,8 +42,13 @@ def bar_kit(
     """The bar's kit, exported; read only."""
     from fabfold.kit.kit import Kit
 
-    kit = Kit.from_model(
-        bar, folder=tmp_path_factory.mktemp("kit") / "bar-kit", workers=1, **bar_options
-    )
-    kit.export()
+    # The processes of one session have folders of their own in one folder, and share the kit.
+    home = tmp_path_factory.getbasetemp()
+    home = home.parent if home.name.startswith("popen-") else home
+    folder = home / "bar-kit"
+    with (home / "bar-kit.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        kit = Kit.from_model(bar, folder=folder, workers=1, **bar_options)
+        if not (folder / "report.json").is_file():
+            kit.export()
     return kit

@@ -34,6 +34,7 @@ def test_figures_that_contradict_are_refused(turns, fuses):
         calibrate(load_profile("fdm-pla-0.4"), turns, fuses_mm=fuses)
 
 
+@pytest.mark.slow
 def test_the_commands_write_coupon_and_profile(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = CliRunner().invoke

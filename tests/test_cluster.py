@@ -124,6 +124,7 @@ def key(candidates):
     return [(c.seed, c.tree.to_json(1.0, (0, 0, 0)), c.path.tolist()) for c in candidates]
 
 
+@pytest.mark.slow
 def test_the_answer_is_that_of_this_machine(problem, alone, dask):
     heard = Results()
     found = search(
@@ -167,6 +168,7 @@ def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, dask):
         assert result.why == "", "it heard, and ended by itself"
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_leaves_the_workers_free(problem, alone, dask):
     def interrupt(_event):
         raise KeyboardInterrupt
@@ -279,6 +281,7 @@ def test_an_address_that_is_none_is_refused(problem, address):
         search(problem, [0], LatticeFoldability(), EFFORT, scheduler=address)
 
 
+@pytest.mark.slow
 def test_a_port_where_nobody_answers_is_refused(problem, monkeypatch):
     monkeypatch.setattr("fabfold.search.dask.CONNECT", 1.0)
     with socket.socket() as taken:
@@ -288,6 +291,7 @@ def test_a_port_where_nobody_answers_is_refused(problem, monkeypatch):
             search(problem, [0], LatticeFoldability(), EFFORT, scheduler=address)
 
 
+@pytest.mark.slow
 def test_without_the_extra_it_is_said_what_to_install(problem, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(RecipeError, match=r"fabfold\[cluster\]"):

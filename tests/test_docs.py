@@ -37,6 +37,7 @@ def code_of(page: Path) -> str:
     return "\n".join(lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if code_of(page).strip()], ids=lambda page: page.name
 )

@@ -149,6 +149,7 @@ def test_06_takes_the_best_of_several_seeds(tmp_path):
     assert tree["energy"]["total"] == pytest.approx(min(found.values()), abs=0.0005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["07_lidded_box_build123d", "09_phone_stand_build123d"])
 def test_hinge_examples_write_step(name, tmp_path):
     run(name, "out", cwd=tmp_path)

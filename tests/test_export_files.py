@@ -404,6 +404,7 @@ write_glb(folder / "fold.glb", joinery, tree, row_motion(tree))
 """
 
 
+@pytest.mark.slow
 def test_two_processes_write_the_same_bytes(tmp_path):
     digests = []
     for name in ("one", "two"):

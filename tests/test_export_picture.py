@@ -171,6 +171,7 @@ def ball_and_block() -> np.ndarray:
     return render([_mesh(solid)], np.array([[143, 169, 196]], np.uint8), view=SMALL)
 
 
+@pytest.mark.slow
 def test_another_process_draws_the_same_bytes():
     found = subprocess.run(
         [sys.executable, "-c", _DRAW, str(Path(__file__).parent)],

@@ -78,6 +78,7 @@ def test_barrels_and_grooves_are_true_cylinders(row):
     assert len(row.shape.solids()[0].faces()) < 30
 
 
+@pytest.mark.slow
 def test_without_a_tree_every_face_is_flat(tmp_path, row):
     facts = write_step(tmp_path / "flat.step", row.joinery)
     assert facts.round_faces == 0
@@ -98,6 +99,7 @@ def test_holes_and_cavities_keep_their_volume(tmp_path):
     assert len(solid.faces()) == 6 + 4 + 24
 
 
+@pytest.mark.slow
 def test_a_body_that_the_kernel_refuses_is_written_flat(tmp_path, monkeypatch):
     from fabfold.export import step
 
@@ -123,6 +125,7 @@ def test_a_body_that_the_kernel_refuses_is_written_flat(tmp_path, monkeypatch):
     assert kinds[2] == {"PLANE", "CYLINDER"}
 
 
+@pytest.mark.slow
 def test_triangles_alone_make_a_valid_solid(tmp_path, monkeypatch):
     from fabfold.export import step
 
@@ -163,6 +166,7 @@ write_step(Path(sys.argv[1]), row_joinery(tree), tree, title="Row")
 """
 
 
+@pytest.mark.slow
 def test_another_process_writes_the_same_bytes(tmp_path, row):
     path = tmp_path / "other.step"
     subprocess.run(

@@ -55,6 +55,7 @@ def squares_meet(one, other):
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half_side", [0.25, CORE_HALF_SIDE, 0.4])
 def test_cores_sweep_what_turning_squares_show(half_side):
     table = core_sweep_table(8, half_side)
@@ -91,6 +92,7 @@ def test_whole_cubes_block_and_cores_pass(slot):
     assert count_free_moves(system, path, carve=CORE_HALF_SIDE) == 1
 
 
+@pytest.mark.slow
 def test_cores_of_systems_with_link_plates_are_planned():
     planned = 0
     for seed in range(40):
@@ -131,6 +133,7 @@ def test_turns_forth_and_back_are_one_clash(slot):
     assert len(once) == len(again) == 1
 
 
+@pytest.mark.slow
 def test_a_cell_that_gives_way_alone_is_rounded(slot, lid):
     # A hinge that takes all of the wall's cell leaves no choice.
     tree, system, path = lid

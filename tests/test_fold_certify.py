@@ -143,6 +143,7 @@ def fitted(meshes):
     return boxes
 
 
+@pytest.mark.slow
 def test_a_barrel_in_its_sleeve_keeps_the_radial_gap():
     import manifold3d
 

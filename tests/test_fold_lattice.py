@@ -224,6 +224,7 @@ def test_a_block_inside_a_ring_cannot_leave():
     assert JUDGE.path(system) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shape", "quarter"), [((2, 2, 2), 2), ((4, 2, 1), 0)])
 def test_planner_and_closure_agree_with_brute_force(shape, quarter):
     folding = 0
@@ -260,6 +261,7 @@ def test_links_without_cells_fold_as_brute_force_says():
     assert folding >= 5
 
 
+@pytest.mark.slow
 def test_larger_random_systems_have_the_closure_of_the_reference():
     for seed in range(12):
         system = random_system((3, 3, 3), 9, seed, 0)
@@ -367,6 +369,7 @@ def test_a_plate_cannot_swing_through_a_cell():
         assert brute_force(system) == folds, wall
 
 
+@pytest.mark.slow
 def test_plates_meet_what_the_reference_says():
     checked = met = 0
     for seed in range(24):

@@ -279,6 +279,7 @@ def test_same_input_gives_the_same_bytes(corner):
         assert one.faces.tobytes() == other.faces.tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("voxel_mm", "clearance_mm"), [(15.0, 0.3), (20.0, 0.6), (40.0, 0.4)])
 def test_other_sizes_keep_their_clearance(voxel_mm, clearance_mm):
     tree = strip_tree(4, [1])

@@ -54,6 +54,7 @@ def lid():
     return kit(LID, LID_HINGES, [0, 1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["slot", "lid"])
 def test_carved_bodies_keep_the_gap_at_every_angle(case, request):
     tree, motion, _, joinery = request.getfixturevalue(case)
@@ -61,6 +62,7 @@ def test_carved_bodies_keep_the_gap_at_every_angle(case, request):
     assert proof(tree, motion, joinery)["min_gap_mm"] == pytest.approx(CLEARANCE, abs=0.011)
 
 
+@pytest.mark.slow
 def test_samples_by_another_library_see_the_gap_too(lid):
     tree, motion, _, joinery = lid
     seen = sample_path(

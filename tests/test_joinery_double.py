@@ -23,6 +23,7 @@ from fabfold.joinery.sizes import hinge_size, smallest_voxel
 from fabfold.joinery.tally import BuildTally
 from fabfold.kit.checking import run_checks
 from fabfold.kit.stages import BuiltTree, PlannedTree
+from fabfold.kit.step_process import StepProcess
 from fabfold.kit.writing import write_kit
 from fabfold.printing.profiles import load_profile
 from fabfold.progress import SilentProgress
@@ -68,6 +69,7 @@ def least_gap(tree, motion, joinery, step_deg=30.0):
     return least
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clearance", [0.3, 0.5])
 def test_every_double_hinge_of_the_catalogue_fits(clearance):
     """All 84 pairs of axes and turns: the link lies in its face, its knuckles about the axes."""
@@ -94,6 +96,7 @@ def test_every_double_hinge_of_the_catalogue_fits(clearance):
             assert np.abs(outer).item() > VOXEL / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sides", "turns"),
     [
@@ -142,6 +145,7 @@ CHAINS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHAINS)
 def test_chains_are_proven(name):
     tree = hand_tree(*CHAINS[name])
@@ -285,10 +289,12 @@ def kit(tmp_path_factory):
     folder = tmp_path_factory.mktemp("double")
     solid = Solid("arm", voxels.vertices * VOXEL, voxels.faces)
     recipe = Recipe(model="arm.stl", template="box-2x2x2")
-    write_kit(folder, recipe, profile, solid, made, checks, SilentProgress())
+    with StepProcess(folder / "arm.step", joinery, tree) as step:
+        write_kit(folder, recipe, profile, solid, made, checks, SilentProgress(), step.wait)
     return folder, tree, joinery, checks
 
 
+@pytest.mark.slow
 def test_a_kit_with_a_link_passes_its_checks(kit):
     _, _, _, checks = kit
     assert [check.name for check in checks if not check.ok] == []
@@ -296,6 +302,7 @@ def test_a_kit_with_a_link_passes_its_checks(kit):
     assert "a link plate" in notes["smallest body"]
 
 
+@pytest.mark.slow
 def test_a_kit_names_its_link_everywhere(kit):
     folder, tree, joinery, _ = kit
     names = [body.name for body in tree.bodies]

@@ -35,6 +35,7 @@ CELLS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(CELLS))
 def test_eroded_cells_are_the_points_far_from_foreign_cells(name):
     cells = np.array(CELLS[name], dtype=np.int32)
@@ -71,6 +72,7 @@ def test_open_mesh_is_refused():
         as_manifold(np.array(box.vert_properties), faces, "torn")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("start", "direction"),
     [

@@ -5,9 +5,11 @@ import shutil
 import pytest
 from numba.core import config
 
+from fabfold.fold.shortcut import shorten
 from fabfold.progress import SilentProgress
 from fabfold.search import kernels
 from fabfold.search.kernels import HALVES, KernelCompiler, compile_half, kernel_stamp
+from fabfold.tree.leaf_assignment import reassign_leaves
 
 
 @pytest.fixture
@@ -45,5 +47,7 @@ def test_another_source_wants_kernels_of_its_own(cache, monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("half", HALVES)
-def test_a_half_runs_by_itself(half):
+def test_a_half_calls_the_kernels_of_its_side(half):
     compile_half(half)
+    called = {"tree": reassign_leaves, "fold": shorten}[half]
+    assert called.signatures

@@ -110,6 +110,7 @@ def test_a_changed_recipe_makes_only_what_depends_on_it(bar_kit, tmp_path):
     assert made == ["join"]
 
 
+@pytest.mark.slow
 def test_without_a_folder_nothing_is_written(bar, bar_options, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     kit = Kit.from_model(bar, **bar_options)

@@ -65,6 +65,7 @@ def test_rotation_about_keeps_the_axis_and_turns_right_handed():
     np.testing.assert_allclose(moved[:3], [1 + np.cos(np.pi / 6), 2.5, 3.0], atol=1e-12)
 
 
+@pytest.mark.slow
 @same
 @given(points, directions, angles, angles)
 def test_turns_about_one_line_add_up(point, direction, one, other):

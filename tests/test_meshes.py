@@ -28,6 +28,7 @@ POINTS = arrays(np.float64, (12, 3), elements=st.sampled_from([0.0, -0.0, 1.0, 2
 FACES = arrays(np.int64, (10, 3), elements=st.integers(0, 11))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["zyx", "xyz", "use"])
 @QUICK
 @given(vertices=POINTS, faces=FACES)

@@ -71,6 +71,7 @@ def stopped(voxelized):
     return kit
 
 
+@pytest.mark.slow
 def test_interrupted_the_best_so_far_is_kept_and_going_on_makes_the_same(stopped, bar_kit):
     (kept,) = content(stopped)
     assert kept["cut"] == 0.0
@@ -93,6 +94,7 @@ def test_no_more_time_takes_the_best_so_far(stopped):
     assert content(again) == [kept]
 
 
+@pytest.mark.slow
 def test_a_budget_goes_through_rounds_and_the_best_of_all_wins(bar_kit, voxelized, monkeypatch):
     # The clock of this test ticks once a look, so that the run is over after some seeds.
     class Counting(Budget):
@@ -122,6 +124,7 @@ def test_a_budget_goes_through_rounds_and_the_best_of_all_wins(bar_kit, voxelize
     assert seeds_of(bar_kit).items() <= seeds_of(again).items()
 
 
+@pytest.mark.slow
 def test_more_time_goes_on_and_the_same_time_does_not_repeat(bar_kit, monkeypatch, tmp_path):
     kit = open_kit(str(bar_kit.folder), folder=tmp_path / "more", workers=1, seconds=0)
     with pytest.raises(NoFoldError, match="nothing folds yet after 0 s"):
@@ -143,10 +146,14 @@ def test_more_time_goes_on_and_the_same_time_does_not_repeat(bar_kit, monkeypatc
     np.testing.assert_allclose(best.energy["total"], min(energies))
 
 
+@pytest.mark.slow
 def test_a_round_looks_at_roomy_voxelizations_first_and_goes_on_where_it_pays(tmp_path):
     path = tmp_path / "block.stl"
     trimesh.creation.box((60.0, 40.0, 20.0)).export(path)
-    kit = Kit.from_model(path, template="box-3x3x3", effort="quick", seed=3, workers=1)
+    folder = tmp_path / "kit"
+    kit = Kit.from_model(
+        path, template="box-3x3x3", effort="quick", seed=3, workers=1, folder=folder
+    )
     sizes = [len(voxels) for voxels in kit.voxelize()]
     assert len(set(sizes)) > 1
     rounds = kit._rounds()
@@ -170,3 +177,12 @@ def test_a_round_looks_at_roomy_voxelizations_first_and_goes_on_where_it_pays(tm
         assert closed_share(candidate.tree) <= rounds.problems.at_most(option) + 1e-9
     energies = [candidate.energy["total"] for _, candidate in found]
     assert energies == sorted(energies)
+
+    # What was found is enough for a share that it reaches; more than the bound is refused at once.
+    most = max(closed_share(candidate.tree) for _, candidate in found)
+    enough = open_kit(str(folder), workers=1, closed=most - 1e-6)
+    assert closed_share(enough.fit()[0].tree) >= most - 1e-6
+    assert best < 1
+    too_much = open_kit(str(folder), workers=1, closed=1.0)
+    with pytest.raises(NoFoldError, match=f"no box of box-3x3x3 .* further than to {best:.2f}"):
+        too_much.fit()

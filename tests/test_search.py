@@ -42,11 +42,13 @@ def test_best_first_from_every_seed(alone):
     assert {c.seed for c in alone} == {0, 1, 2, 3}
 
 
+@pytest.mark.slow
 def test_the_number_of_workers_changes_nothing(problem, alone):
     together = search(problem, range(4), LatticeFoldability(), EFFORT, workers=2)
     assert key(together) == key(alone)
 
 
+@pytest.mark.slow
 def test_known_seeds_are_not_searched_again(problem, alone):
     kept = Results()
     search(problem, [0, 1], LatticeFoldability(), EFFORT, workers=1, on_event=kept.on_event)
@@ -101,6 +103,7 @@ def test_where_every_seed_fails_it_is_said_and_not_taken_for_no_fold(problem):
         search(problem, [7], judge, EFFORT, workers=1)
 
 
+@pytest.mark.slow
 def test_better_trees_are_told_of_before_the_seed_ends(problem):
     for workers in (1, 2):
         heard = Results()
@@ -116,6 +119,7 @@ def test_better_trees_are_told_of_before_the_seed_ends(problem):
             assert heard.order.index(("Better", seed)) < heard.order.index(("Done", seed))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, workers):
     heard = Results()
@@ -135,6 +139,7 @@ def test_when_time_is_over_seeds_end_early_with_what_they_have(problem, workers)
         assert check_tree(result.candidates[0].tree) == []
 
 
+@pytest.mark.slow
 def test_a_worker_that_does_not_hear_is_ended_and_its_last_word_counts(problem, monkeypatch):
     monkeypatch.setattr("fabfold.search.run.GRACE", 0.2)
     heard = Results()
@@ -150,6 +155,7 @@ def test_a_worker_that_does_not_hear_is_ended_and_its_last_word_counts(problem, 
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.slow
 def test_workers_end_when_their_parent_is_killed():
     code = (
         "import multiprocessing\n"

@@ -96,6 +96,7 @@ def refusal(path: Path) -> str:
 # ---- formats -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_every_format_gives_the_same_solid(tmp_path: Path) -> None:
     import build123d
     import trimesh
@@ -211,6 +212,7 @@ def test_concave_polygon_is_cut_inside_itself(tmp_path: Path) -> None:
     assert result.notes == ()
 
 
+@pytest.mark.slow
 def test_step_with_two_touching_solids(tmp_path: Path) -> None:
     import build123d as b
 
@@ -279,6 +281,7 @@ def test_nested_shells_facing_outwards_are_a_full_body() -> None:
     assert solid(ball(2), ball(1)).volume == pytest.approx(solid(ball(2)).volume)
 
 
+@pytest.mark.slow
 def test_self_crossing_tube_has_its_overlap_once() -> None:
     # A thick tube along one and a quarter turns: its two ends run into each other.
     turns = np.linspace(0, 2.5 * np.pi, 81)
@@ -386,6 +389,7 @@ def test_vertex_on_a_neighbours_edge() -> None:
     assert result.volume == pytest.approx(1)
 
 
+@pytest.mark.slow
 def test_surface_with_big_openings_is_wrapped() -> None:
     # A cage of loose plates with gaps between them: no rim to cap, but a clear inside.
     plates = []
@@ -416,6 +420,7 @@ def test_small_loose_pieces() -> None:
     assert any("1 loose piece was dropped" in note for note in far.notes)
 
 
+@pytest.mark.slow
 def test_dense_mesh_is_thinned() -> None:
     import trimesh
 
@@ -431,6 +436,7 @@ def test_dense_mesh_is_thinned() -> None:
 # ---- refusals ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parts", "words"),
     [
@@ -458,6 +464,7 @@ def test_turned_plate_is_refused() -> None:
         solid(cube() * (100, 100, 0.5) @ turn.T)
 
 
+@pytest.mark.slow
 def test_one_sided_strip_is_refused() -> None:
     angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
     rims = []
@@ -614,6 +621,7 @@ BAD: dict[str, float | str] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(BAD))
 def test_broken_models(name: str, capfd: pytest.CaptureFixture[str]) -> None:
     path = MODELS / "bad" / name
@@ -640,6 +648,7 @@ def _sound_models() -> list[str]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     not _sound_models(), reason="the collection of models is not beside this checkout"
 )

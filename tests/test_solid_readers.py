@@ -114,6 +114,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 # ---- what is written is read -------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRITERS)
 @QUICK
 @given(mesh=meshes())
@@ -129,6 +130,7 @@ def test_triangles_come_back_exactly(name: str, folder: Path, mesh: Mesh) -> Non
         assert np.array_equal(found.faces, faces)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRITERS)
 @QUICK
 @given(
@@ -165,6 +167,7 @@ WORDS = st.sampled_from(VOCABULARY.split())
 LINES = st.lists(st.lists(WORDS, max_size=7).map(" ".join), max_size=12).map("\n".join)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", READERS)
 @QUICK
 @given(data=st.data())
@@ -184,6 +187,7 @@ def test_garbage_ends_in_a_message(name: str, folder: Path, data: st.DataObject)
         assert len(found.faces) > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRITERS)
 @QUICK
 @given(data=st.data())

@@ -164,6 +164,7 @@ def test_shipped_folding_templates_fold_into_a_box_without_collision(name):
     assert count_free_moves(system, path) == len(path)
 
 
+@pytest.mark.slow
 def test_a_model_folds_into_the_flat_template_and_then_shut(tmp_path):
     template = load_template(written(tmp_path, BOOK))
     problem = solid_problem(strip(16), written(tmp_path, BOOK))
@@ -222,6 +223,7 @@ def test_hinges_that_meet_only_when_the_template_is_shut_clash(tmp_path):
     assert met > 0
 
 
+@pytest.mark.slow
 def test_voxels_that_cannot_be_shared_out_are_refused(tmp_path):
     problem = solid_problem(strip(16), written(tmp_path, BOOK), hinge=np.zeros((15, 4), bool))
     with pytest.raises(NoTreeError, match="8 \\+ 8 cells"):
@@ -231,6 +233,7 @@ def test_voxels_that_cannot_be_shared_out_are_refused(tmp_path):
 # --- meshes --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_mesh_of_blocks_becomes_exactly_its_blocks():
     u = blocks(((0, 0, 0), (12, 8, 4)), ((0, 0, 4), (4, 8, 12)), ((8, 0, 4), (12, 8, 12)))
     template = template_of_solid(u)
@@ -261,6 +264,7 @@ def test_a_number_of_cells_needs_a_mesh(tmp_path):
 # --- kits --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["toml", "stl"])
 def test_a_kit_makes_itself_again_without_the_files_it_came_from(tmp_path, kind):
     from fabfold.kit.kit import open_kit

@@ -71,6 +71,7 @@ def test_balls_between_two_faces_have_half_their_distance_as_radius():
     assert (balls.radii <= 3.0).all()
 
 
+@pytest.mark.slow
 def test_balls_in_a_round_rod_lie_on_its_axis():
     rod = manifold3d.Manifold.cylinder(30, 2, 2, 48)
     balls = inner_balls(*(np.asarray(a) for a in to_mesh(rod)), 5.0)
@@ -98,6 +99,7 @@ def test_a_thin_rod_grows_and_the_thick_part_keeps_its_surface():
     assert 0 < made.share < 0.5
 
 
+@pytest.mark.slow
 def test_a_plate_gets_the_thickness_that_is_wanted():
     made = thickened(solid_of(box(0, 0, 0, 60, 50, 1)), 4.0)
     body = to_manifold(made.solid.vertices, made.solid.faces)
@@ -113,12 +115,14 @@ def test_what_is_thick_enough_stays_the_same_object():
     assert thickened(cube, 8.0).solid is cube
 
 
+@pytest.mark.slow
 def test_thickening_gives_the_same_bytes_again():
     one, other = thickened(lollipop(), 5.0).solid, thickened(lollipop(), 5.0).solid
     assert np.array_equal(one.vertices, other.vertices)
     assert np.array_equal(one.faces, other.faces)
 
 
+@pytest.mark.slow
 def test_a_hollow_that_closes_is_filled():
     parts = [box(0, 0, 0, 20, 20, 1), box(0, 0, 5, 20, 20, 6)]
     parts += [box(0, 0, 0, 1, 20, 6), box(19, 0, 0, 20, 20, 6), box(0, 0, 0, 20, 1, 6)]
@@ -159,6 +163,7 @@ def test_bosses_are_kept_in_files(tmp_path):
         assert load_voxels(tmp_path / "v.npz").bosses is bosses
 
 
+@pytest.mark.slow
 def test_the_first_step_that_can_be_cut_is_kept():
     model = lollipop()
     tried = []
@@ -190,6 +195,7 @@ def test_a_model_that_can_be_cut_is_left_alone():
     assert done.notes(20.0) == ()
 
 
+@pytest.mark.slow
 def test_the_refusal_of_the_model_is_told_where_no_step_helps():
     def cut(solid):
         raise NoVoxelsError("no placement of the grid fits")
@@ -246,6 +252,7 @@ def wheel(folder):
     return path
 
 
+@pytest.mark.slow
 def test_the_command_tells_by_how_much_and_off_refuses(tmp_path):
     model = str(wheel(tmp_path))
     run = lambda *more: CliRunner().invoke(  # noqa: E731

@@ -81,6 +81,7 @@ def test_assignment_is_scipys():
         assert cost[row_of[taken], taken].sum() == pytest.approx(cost[i, j].sum())
 
 
+@pytest.mark.slow
 def test_leaves_move_to_full_poses_of_the_energy_told():
     problem = animal(27, "box-3x3x3", 2)
     pose = pose_of_tree(solve(problem, 3, LatticeFoldability(), QUICK)[0].tree)

@@ -74,6 +74,7 @@ def test_rows_of_each_set_of_joints():
     assert not doubled(strip(4), "box-2x2x1", "all").keeps_colour
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("face", range(6))
 def test_every_way_makes_its_joint(face):
     total = 0
@@ -95,6 +96,7 @@ def test_every_way_makes_its_joint(face):
     assert total == 12 * 9
 
 
+@pytest.mark.slow
 def test_colours_that_do_not_fit_want_all_joints():
     # A plus has one cell of one colour and four of the other.
     cells = [(1, 1, 0), (0, 1, 0), (2, 1, 0), (1, 0, 0), (1, 2, 0)]
@@ -103,6 +105,7 @@ def test_colours_that_do_not_fit_want_all_joints():
     assert doubled(cells, "box-5x1x1", "all").colourings() == [0, 1]
 
 
+@pytest.mark.slow
 def test_trees_reserve_edges_voxels_and_faces():
     rng = np.random.default_rng(0)
     problem = doubled(strip(8), "box-2x2x2", hinge=rng.random((7, 4)) < 0.3)
@@ -174,6 +177,7 @@ def test_the_filter_agrees_with_the_planner_on_two_cubes():
     assert passed
 
 
+@pytest.mark.slow
 def test_a_strip_without_single_hinges_folds_by_double_ones(tree):
     made = tree.tree
     assert check_tree(made) == []

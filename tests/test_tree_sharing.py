@@ -167,6 +167,7 @@ def together(pose):
     return [np.flatnonzero(pose // 24 == c) for c, n in cells.items() if n == 2]
 
 
+@pytest.mark.slow
 def test_voxels_share_only_where_their_eighths_differ():
     problem, material = crowd()
     shared = 0
@@ -180,6 +181,7 @@ def test_voxels_share_only_where_their_eighths_differ():
     assert shared > 20
 
 
+@pytest.mark.slow
 def test_nearer_material_is_seen_in_a_shared_cell():
     problem, material = crowd()
     tables = problem.tables
@@ -295,6 +297,7 @@ def built(folded):
     return candidate.tree, motion, joinery
 
 
+@pytest.mark.slow
 def test_thin_ends_share_a_cell(folded):
     _, _, candidate = folded
     tree = candidate.tree

@@ -30,6 +30,7 @@ def best_of_seeds(problem):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("length", "template", "joints"),
     [(4, "box-2x2x1", 1), (6, "box-2x3x1", 1), (6, "box-3x1x2", 1), (8, "box-2x2x2", 3)],
@@ -41,6 +42,7 @@ def test_strips_fold_with_the_fewest_hinges(length, template, joints):
     assert best.energy["count"] == pytest.approx(0.1 * joints)
 
 
+@pytest.mark.slow
 def test_a_box_that_is_its_own_template_needs_no_hinge():
     cells = [(x, y, z) for x in range(2) for y in range(2) for z in range(2)]
     best = best_of_seeds(solid_problem(cells, "box-2x2x2"))
@@ -73,6 +75,7 @@ def test_voxels_without_a_printable_joint():
         solid_problem(strip(4), "box-2x2x1", rigid=rigid, hinge=hinge)
 
 
+@pytest.mark.slow
 def test_hinges_stay_on_printable_edges():
     hinge = np.ones((3, 4), dtype=bool)
     hinge[1] = [True, False, False, False]
@@ -113,6 +116,7 @@ def dog_trees(dog):
     return solve(dog, 0, LatticeFoldability(), QUICK)
 
 
+@pytest.mark.slow
 def test_an_animal_folds(dog_trees):
     assert dog_trees
     assert energies(dog_trees) == sorted(energies(dog_trees))
@@ -125,6 +129,7 @@ def test_an_animal_folds(dog_trees):
         assert count_free_moves(system, candidate.path) == len(candidate.path)
 
 
+@pytest.mark.slow
 def test_candidates_differ(dog_trees):
     hinges = [{(h.point, h.angle_deg) for h in c.tree.hinges} for c in dog_trees]
     for i, one in enumerate(hinges):
@@ -151,6 +156,7 @@ def test_full_template_of_125_cells_is_filled():
     assert len(set((pose // 24).tolist())) == 125
 
 
+@pytest.mark.slow
 def test_nothing_folds_without_budget(dog):
     class Stubborn(LatticeFoldability):
         def estimate(self, system, expansions, guide=None):

@@ -39,6 +39,7 @@ def warp_planes(seed: int = 0, cells: int = 6) -> tuple[tuple, tuple]:
     return tuple(moved), regular
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_scan_of_a_turned_box_is_its_inside(seed):
     rotation = random_rotation(seed)
@@ -80,6 +81,7 @@ def test_a_mesh_that_reaches_out_of_the_grid_is_cut_off():
     assert scan_mesh(vertices, faces, (5, 6, 7)).all()
 
 
+@pytest.mark.slow
 def test_summed_volume_table_counts_boxes():
     vertices, faces = mesh_arrays(trimesh.creation.torus(8.0, 3.0))
     shape = (24, 24, 8)
@@ -121,6 +123,7 @@ def energy_by_counting(table: np.ndarray, planes: tuple, energy: CellEnergy) -> 
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("axis", range(3))
 def test_dynamic_programming_finds_the_best_offsets(seed, axis):

@@ -105,6 +105,7 @@ def l_cells() -> np.ndarray:
     return np.array([[i, 0, 0] for i in range(4)] + [[0, 1, 0], [0, 2, 0], [0, 0, 1]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["box-3x3x3", "box-3x4x4"])
 def test_sphere_and_torus_fit_and_hang_together(name):
     template = load_template(name)
@@ -118,6 +119,7 @@ def test_sphere_and_torus_fit_and_hang_together(name):
         assert len(results[0]) >= 0.75 * len(template)
 
 
+@pytest.mark.slow
 def test_results_are_different_and_of_several_sizes():
     template = load_template("box-3x3x3")
     results = voxelize(torus(), template, placements=30, shortlist=12, results=4)
@@ -140,6 +142,7 @@ def test_larger_templates_are_left_emptier():
     assert least == pytest.approx([0.8, 0.75, 0.7, 0.6])
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(tmp_path):
     template = load_template("box-3x3x3")
     for name in ("a", "b"):
@@ -150,6 +153,7 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path):
         assert one.read_bytes() == other.read_bytes()
 
 
+@pytest.mark.slow
 def test_size_and_place_of_the_model_do_not_matter():
     template = load_template("box-3x3x3")
     parts = [trimesh.creation.icosphere(subdivisions=3, radius=r) for r in (10.0, 7.0, 5.0)]
@@ -221,6 +225,7 @@ def test_small_islands_are_lost_not_kept():
     assert best.lost_volume > 0.015  # the small ball is 2.6 % of the volume
 
 
+@pytest.mark.slow
 def test_thin_things_end_with_a_clear_error():
     template = load_template("box-4x4x4")
     plate = solid_of(trimesh.creation.box((100, 100, 0.01)))
@@ -231,6 +236,7 @@ def test_thin_things_end_with_a_clear_error():
         voxelize(needle, template)
 
 
+@pytest.mark.slow
 def test_a_pitch_that_cannot_fit_says_how_many_cells_there_are():
     template = load_template("box-2x2x2")
     cube = solid_of(trimesh.creation.box((40, 40, 40)))

@@ -6,6 +6,7 @@ from fabfold.tree.catalogue import JOINT_SETS, JointSet
 from fabfold.tree.kinematics_check import check_tree
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", JOINT_SETS)
 def test_the_strip_folds_whatever_the_seed(joints: JointSet) -> None:
     for seed in range(3):

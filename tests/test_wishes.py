@@ -158,6 +158,7 @@ def test_points_follow_the_grid():
     assert np.delete(share, face, axis=1).sum() == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_protected_voxels_are_one_body():
     solid = bar()
     voxels = cut(solid, "box-4x4x2")
@@ -213,6 +214,7 @@ def test_grids_with_few_cuts_come_first():
     assert rank_by_cuts([region], options, shape) == [1, 0]
 
 
+@pytest.mark.slow
 def test_kept_share_rises():
     solid = bar(4.0, 3.0, 2.0)
     voxels = cut(solid, "box-3x4x2")
@@ -267,6 +269,7 @@ def small_problem(template):
     )
 
 
+@pytest.mark.slow
 def test_hinges_inside_are_inside():
     anywhere = load_template("box-3x3x3")
     inside = replace(anywhere, joints="inside")

@@ -13,7 +13,7 @@ from rich.progress import Progress as RichProgress
 from rich.table import Table
 
 from fabfold.errors import RecipeError
-from fabfold.progress import Progress
+from fabfold.progress import Progress, processor_seconds
 
 if TYPE_CHECKING:
     from fabfold.kit.kit import Kit
@@ -31,6 +31,15 @@ _TITLES = {
     "join": "Making bodies and hinges",
     "check": "Checking",
     "export": "Writing the kit",
+}
+_STAGES = {
+    "solid": "reading",
+    "voxelize": "cutting",
+    "fit": "searching",
+    "fold": "path",
+    "join": "bodies",
+    "check": "checks",
+    "export": "files",
 }
 
 
@@ -111,6 +120,15 @@ def show_result(kit: Kit, stage: str) -> None:
     console = Console(highlight=False, soft_wrap=True)
     for line in _result_lines(kit, stage):
         console.print(line, markup=False)
+    # Not part of the kit, whose files are the same on every machine.
+    spent = {
+        _STAGES.get(name, name): seconds
+        for name, seconds in kit.processor_seconds.items()
+        if seconds >= 0.1
+    }
+    if spent:
+        each = ", ".join(f"{name} {seconds:.1f}" for name, seconds in spent.items())
+        console.print(f"processor seconds: {each}; {processor_seconds():.1f} with the start")
 
 
 def _result_lines(kit: Kit, stage: str) -> list[str]:

@@ -196,12 +196,10 @@ def _polar(
 def _strip(
     points: NDArray[np.float64], normal: NDArray[np.float64], axis: Axis
 ) -> tuple[float, float, bool] | None:
-    """Radius at the axis' point, slope and side of the surface that a flat strip stands for."""
+    """Radius at the axis' point, slope and side of the surface that a narrow strip stands for."""
     radius, angle, height = _polar(points, axis)
     far = radius > 10 * ROUND_MM
     turn = np.angle(np.exp(1j * (angle[far] - angle[far][0])))
-    if np.ptp(turn) > np.radians(12.0) or np.ptp(turn) < 1e-3:
-        return None
     if np.ptp(radius) < ROUND_MM:
         fit = (float((radius.min() + radius.max()) / 2), 0.0)
     else:
@@ -316,7 +314,10 @@ def _narrow(
     corners_of: list[NDArray[np.int32]],
     axis: Axis,
 ) -> list[int]:
-    """Regions within an axis' reach and not flat along it; :func:`_strip` asks no more of these."""
+    """Regions that are narrow strips within an axis' reach: what :func:`_strip` takes for granted.
+
+    All regions at once, since most are sorted out here.
+    """
     if not regions:
         return []
     first = np.cumsum([0, *(len(corners_of[region]) for region in regions[:-1])])

@@ -16,8 +16,16 @@ from fabfold.meshes import compact, weld
 
 if TYPE_CHECKING:
     import manifold3d
+    import pymeshlab
 
-__all__ = ["crossing_triangles", "mesh_faults", "piece_count", "printable_body", "stl_mesh"]
+__all__ = [
+    "crossing_triangles",
+    "mesh_faults",
+    "meshlab_set",
+    "piece_count",
+    "printable_body",
+    "stl_mesh",
+]
 
 #: Flat faces are merged and short edges collapsed up to this deviation.
 SIMPLIFY_MM = 0.001
@@ -121,12 +129,36 @@ def crossing_triangles(
     (k,) int64 array
         Their indices; empty for a surface that is a plain solid's.
     """
+    meshes = meshlab_set(vertices, faces)
+    meshes.compute_selection_by_self_intersections_per_face()
+    return np.flatnonzero(meshes.current_mesh().face_selection_array()).astype(np.int64)
+
+
+def meshlab_set(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> pymeshlab.MeshSet:
+    """A mesh as MeshLab takes it.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+        Corners of the mesh.
+    faces : (f, 3) int32 array
+        Triangles as indices into `vertices`.
+
+    Returns
+    -------
+    pymeshlab.MeshSet
+        With this one mesh.
+    """
     import pymeshlab
 
     meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(faces)))
-    meshes.compute_selection_by_self_intersections_per_face()
-    return np.flatnonzero(meshes.current_mesh().face_selection_array()).astype(np.int64)
+    meshes.add_mesh(
+        pymeshlab.Mesh(
+            np.ascontiguousarray(vertices, dtype=np.float64),
+            np.ascontiguousarray(faces, dtype=np.int32),
+        )
+    )
+    return meshes
 
 
 def piece_count(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> int:

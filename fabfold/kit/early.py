@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import signal
 import subprocess
@@ -15,6 +14,7 @@ from fabfold.kit.stages import PlannedTree, build
 from fabfold.printing.profiles import Profile
 from fabfold.progress import Listener
 from fabfold.recipe.recipe import Recipe
+from fabfold.search.processes import module_call
 from fabfold.search.rounds import Found
 from fabfold.tree.bound import closed_share
 
@@ -57,27 +57,25 @@ class EarlyKit:
         self._thread = threading.Thread(target=self._make, args=(planned,), daemon=True)
         self._thread.start()
 
-    def wait(self) -> None:
+    def __enter__(self) -> EarlyKit:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         """Wait until nothing is written any more."""
         if self._thread is not None:
             self._thread.join()
 
     def _make(self, planned: PlannedTree) -> None:
         work = pickle.dumps((planned, self._profile, self._recipe, self._folder))
-        # A script of the user's is not read again, as the start of a worker would do.
-        path = os.pathsep.join(part for part in sys.path if part)
+        command, environment = module_call("fabfold.kit.early")
         with self._listener.stage("early") as progress:
             done = subprocess.run(
-                [sys.executable, "-m", "fabfold.kit.early"],
-                input=work,
-                env={**os.environ, "PYTHONPATH": path},
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                check=False,
+                command, input=work, env=environment, capture_output=True, check=False
             )
             if done.returncode:
-                # The bodies of this tree do not come out; the search has others.
-                progress.update(1.0, "its bodies do not come out; going on without")
+                # The search has other trees.
+                why = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+                progress.update(1.0, f"not this one: {' '.join(why)}")
                 return
             hinges, closed = len(planned.tree.hinges), 100 * closed_share(planned.tree)
             text = f"{hinges} hinges, box closed to {closed:.0f} %; better ones replace it"

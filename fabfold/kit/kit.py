@@ -8,18 +8,18 @@ With a folder, finished stages are kept there, and the same recipe goes on from 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from fabfold.errors import KitError, RecipeError
 from fabfold.files import write_text
 from fabfold.kit import keys
+from fabfold.kit.stage_runner import StageRunner
 from fabfold.kit.stages import BuiltTree, PlannedTree, build_first
 from fabfold.lattice.template import Template
-from fabfold.progress import Listener, Progress, SilentListener
+from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
 from fabfold.recipe.start import require_free_folder, set_up_project
 from fabfold.recipe.targets import load_target
@@ -42,10 +42,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Kit", "open_kit"]
 
-Result = TypeVar("Result")
 
-
-class Kit:
+class Kit(StageRunner):
     """One model on its way to a printed, folding object.
 
     Parameters
@@ -85,15 +83,13 @@ class Kit:
             from fabfold.search.dask import check_address
 
             check_address(scheduler)
+        super().__init__(StageStore(folder))
         self.recipe = recipe
         self.folder = folder
         self.workers = workers
         self.scheduler = scheduler
         self.seconds = seconds
-        self.listener: Listener = SilentListener()
         self._model = model
-        self._store = StageStore(folder)
-        self._results: dict[str, Any] = {}
         self._early: EarlyKit | None = None
         self._compiler: KernelCompiler | None = None
         self._template_file = template
@@ -266,6 +262,7 @@ class Kit:
             If there is no folder to write to, or it holds something else.
         """
         from fabfold.kit.early import EarlyKit
+        from fabfold.kit.step_process import StepProcess
         from fabfold.kit.writing import write_kit
 
         target = self.folder if folder is None else Path(folder)
@@ -274,18 +271,18 @@ class Kit:
         require_free_folder(target)
         profile = self.profile()
         if target == self.folder and not self.recipe.pick:
-            self._early = EarlyKit(target, self.recipe, profile, self.listener)
-        self.fold()
-        if self._early is not None:
-            self._early.wait()
+            with EarlyKit(target, self.recipe, profile, self.listener) as self._early:
+                self.fold()
         built = self.join()
-        checks = self.check()
-        with self.listener.stage("export") as progress:
-            write_kit(
-                target, self.recipe, profile, self.cut_solid(), built, checks, progress,
-                self.wish_report(built.planned, built.joinery), self._template,
-                self.box_closure(built.planned),
-            )  # fmt: skip
+        path, tree = target / f"{self.recipe.name}.step", built.planned.tree
+        with StepProcess(path, built.joinery, tree, beside=self.workers != 1) as step:
+            checks = self.check()
+            with self._open_progress("export") as progress:
+                write_kit(
+                    target, self.recipe, profile, self.cut_solid(), built, checks, progress,
+                    step.wait, self.wish_report(built.planned, built.joinery), self._template,
+                    self.box_closure(built.planned),
+                )  # fmt: skip
         if target != self.folder:
             if self._model is not None:
                 StageStore(target).keep(self._model, self.recipe.sha256, "model")
@@ -425,38 +422,11 @@ class Kit:
             for voxels, candidate in pairs:
                 yield PlannedTree(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
 
-    def _open_progress(self, name: str) -> AbstractContextManager[Progress]:
-        """Progress of a stage that is about to be made; the recipe is written before the first."""
+    def _begin(self) -> None:
+        """Write the recipe, and keep the template's file, before the first stage is made."""
         if self.folder is not None:
             write_text(self.folder / "kit.toml", self.recipe.to_toml())
             self._keep_template(self._store)
-        return self.listener.stage(name)
-
-    def _is_done(self, name: str, key: str) -> bool:
-        """Whether the result of a stage is in memory or in the kit folder."""
-        return name in self._results or self._store.holds(name, key)
-
-    def _stage(
-        self,
-        name: str,
-        key: str,
-        make: Callable[[Progress], Result],
-        save: Callable[[StageStore, Result], list[str]],
-        load: Callable[[StageStore, list[str]], Result],
-    ) -> Result:
-        """Result of a stage: from memory, from the kit folder, or made now and kept."""
-        if name in self._results:
-            result: Result = self._results[name]
-            return result
-        if self._is_done(name, key):
-            result = load(self._store, self._store.files(name))
-        else:
-            with self._open_progress(name) as progress:
-                result = make(progress)
-            if self._store.folder is not None:
-                self._store.record(name, key, save(self._store, result))
-        self._results[name] = result
-        return result
 
 
 def open_kit(

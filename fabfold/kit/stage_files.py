@@ -33,9 +33,13 @@ __all__ = [
 ]
 
 
+#: The model, and the thicker one where it was thickened.
+_SOLID, _THICK = "solid.npz", "cut-solid.npz"
+
+
 def save_solid(store: StageStore, solid: Solid) -> list[str]:
     """Write a solid."""
-    return _save_mesh(store, "solid.npz", solid)
+    return _save_mesh(store, _SOLID, solid)
 
 
 def load_solid(store: StageStore, files: list[str]) -> Solid:
@@ -68,21 +72,20 @@ def _load_mesh(store: StageStore, file: str) -> Solid:
 
 
 def save_cut(store: StageStore, cut: Cut) -> list[str]:
-    """Write voxelizations, best first, and what they are cut from."""
+    """Write voxelizations, best first, and what they are cut from unless that is the model."""
     names = [f"voxels-{index:02d}.npz" for index in range(len(cut.options))]
     for name, voxels in zip(names, cut.options, strict=True):
         save_voxels(store.path(name), voxels)
     write_json(store.path("cut.json"), {"wanted": cut.wanted, "least": cut.least})
-    return [*_save_mesh(store, "cut-solid.npz", cut.solid), "cut.json", *names]
+    return ["cut.json", *names, *(_save_mesh(store, _THICK, cut.solid) if cut.wanted else [])]
 
 
 def load_cut(store: StageStore, files: list[str]) -> Cut:
     """Read what :func:`save_cut` wrote."""
-    solid, about, *names = files
-    data = json.loads(store.path(about).read_text(encoding="utf-8"))
+    data = json.loads(store.path(files[0]).read_text(encoding="utf-8"))
     return Cut(
-        _load_mesh(store, solid),
-        [load_voxels(store.path(name)) for name in names],
+        _load_mesh(store, _THICK if _THICK in files else _SOLID),
+        [load_voxels(store.path(name)) for name in files[1:] if name != _THICK],
         float(data["wanted"]),
         float(data["least"]),
     )

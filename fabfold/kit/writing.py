@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,6 @@ from fabfold.export.kit_picture import write_strip
 from fabfold.export.render import png_bytes
 from fabfold.export.report import write_report
 from fabfold.export.sketch import picture_of_tree
-from fabfold.export.step import write_step
 from fabfold.export.stl import write_stl
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.files import write_bytes, write_json, write_text
@@ -211,6 +210,7 @@ def write_kit(
     built: BuiltTree,
     checks: list[Check],
     progress: Progress,
+    finish_step: Callable[[], None],
     wishes: Sequence[dict[str, Any]] = (),
     template: Template | None = None,
     closure: BoxClosure | None = None,
@@ -233,6 +233,8 @@ def write_kit(
         Every check, passed or failed.
     progress : Progress
         Hears which file is written.
+    finish_step : callable
+        Returns once the STEP file is there; the report, written last, says that the kit is whole.
     wishes : sequence of dict
         What became of each wish.
     template : Template, optional
@@ -255,13 +257,13 @@ def write_kit(
             metadata={"Application": f"fabfold {__version__}"},
             colours=colours,
         )
-    progress.update(0.3, "STEP")
-    write_step(folder / f"{name}.step", joinery, tree, title=name, colours=colours)
-    progress.update(0.8, "animation")
+    progress.update(0.3, "animation")
     write_glb(folder / "fold.glb", joinery, tree, motion, title=name, colours=colours)
-    progress.update(0.85, "picture")
+    progress.update(0.4, "picture")
     upright = built.planned.voxels.rotation.T
     write_strip(folder / "fold.png", joinery, tree, motion, colours=colours, upright=upright)
+    progress.update(0.8, "STEP")
+    finish_step()
     progress.update(0.95, "report")
     write_checks(folder, solid, built, checks, wishes, closure)
     progress.update(1.0, str(folder))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fabfold.joinery.bodies import Joinery
+from fabfold.joinery.soundness import meshlab_set
 from fabfold.printing.checks import Check
 from fabfold.progress import Progress
 
@@ -26,19 +25,11 @@ def check_topology(joinery: Joinery, progress: Progress) -> list[Check]:
     list of Check
         Four checks over all bodies, as MeshLab sees them.
     """
-    import pymeshlab
-
     names = [body.name for body in joinery.bodies]
     opened, branching, pieces, crossing = [], [], [], []
     for index, body in enumerate(joinery.bodies):
         progress.update(0.4 * index / len(names), f"mesh of {body.name}")
-        meshes = pymeshlab.MeshSet(verbose=False)
-        meshes.add_mesh(
-            pymeshlab.Mesh(
-                np.ascontiguousarray(body.vertices, dtype=np.float64),
-                np.ascontiguousarray(body.faces, dtype=np.int32),
-            )
-        )
+        meshes = meshlab_set(body.vertices, body.faces)
         measures = meshes.get_topological_measures()
         opened.append(int(measures["boundary_edges"]))
         branching.append(

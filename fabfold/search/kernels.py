@@ -8,9 +8,9 @@ model is read and cut; the search begins when they are done.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
-import platform
 import subprocess
 import sys
 import time
@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from fabfold.progress import Progress
+from fabfold.search.processes import module_call
 
 __all__ = ["HALVES", "KernelCompiler", "compile_half", "kernel_stamp"]
 
@@ -34,11 +35,11 @@ def kernel_stamp() -> Path:
     """File that is there once the kernels of these sources are compiled for this machine."""
     import numba
     from numba.core import config
+    from numba.core.registry import cpu_target
 
     root = Path(__file__).resolve().parents[1]
-    digest = hashlib.sha256(
-        f"{numba.__version__} {sys.version} {platform.machine()} {os.cpu_count()}".encode()
-    )
+    machine = cpu_target.target_context.codegen().magic_tuple()
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version} {machine}".encode())
     for package in _PACKAGES:
         for path in sorted((root / package).glob("*.py")):
             about = path.stat()
@@ -67,18 +68,14 @@ class KernelCompiler:
         """Begin, unless the kernels are there or it has begun already."""
         if self._running or self._stamp.exists():
             return
-        # A script of the user's is not read again, as the start of a worker would do.
-        environment = {
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
-            # LLVM's first level makes kernels as fast as its third, in two thirds of the time.
-            "NUMBA_OPT": os.environ.get("NUMBA_OPT", "1"),
-        }
+        atexit.register(self.close)  # where the run ends before the search begins
         for half in HALVES:
-            call = [sys.executable, "-m", "fabfold.search.kernels", half]
+            command, environment = module_call("fabfold.search.kernels", half)
+            # LLVM's first level makes kernels as fast as its third, in less time.
+            environment.setdefault("NUMBA_OPT", "1")
             self._running.append(
                 subprocess.Popen(
-                    call, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+                    command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
                 )
             )
 
@@ -115,6 +112,7 @@ class KernelCompiler:
                 process.terminate()
             process.wait()
         self._running.clear()
+        atexit.unregister(self.close)
 
     def _write_stamp(self) -> None:
         try:

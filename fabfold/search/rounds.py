@@ -18,7 +18,7 @@ from fabfold.recipe.recipe_wishes import wished
 from fabfold.search.kernels import KernelCompiler
 from fabfold.search.run import Budget, Tally, executor, require_fit, run_seeds, warm_up
 from fabfold.search.saved import SeedCache
-from fabfold.search.schedule import GAIN, SEEDS_PER_ROUND, Rung, schedule
+from fabfold.search.schedule import SEEDS_PER_ROUND, Rung, schedule
 from fabfold.search.seeds import Batch, Event, Executor, Job, SeedResult
 from fabfold.search.voxelization_problems import VoxelizationProblems
 from fabfold.store import StageStore, stage_key
@@ -334,8 +334,7 @@ class Rounds:
             if place == 0 and self._on_first is not None:
                 for pair in self._paired(results)[:1]:
                     self._on_first(pair)
-            stale = rung.takes == "best" and _best(results) > before - GAIN
-            if budget.over() or stale:
+            if budget.over() or rung.is_last(before, _best(results)):
                 break
         return results
 
@@ -361,7 +360,7 @@ class Rounds:
             if any(task.seed not in results for task in tasks):
                 return False
             seen |= {task.seed: results[task.seed] for task in tasks}
-            if rung.takes == "best" and _best(seen) > before - GAIN:
+            if rung.is_last(before, _best(seen)):
                 break
         return True
 

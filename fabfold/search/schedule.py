@@ -18,7 +18,7 @@ __all__ = ["SEEDS_PER_ROUND", "Rung", "schedule"]
 
 #: Numbers that a round keeps for its seeds; a constant, so that rounds of any effort keep theirs.
 SEEDS_PER_ROUND = 100
-#: Least gain in energy, over a rung of polishing, for which another one follows.
+#: Least gain in energy, over a rung that changes the best trees, for which another one follows.
 GAIN = 0.02
 
 
@@ -44,6 +44,10 @@ class Rung:
     seeds: int
     effort: Effort
     options: int = 1
+
+    def is_last(self, before: float, after: float) -> bool:
+        """Whether no rung follows, by the least energy before this one and after it."""
+        return self.takes == "best" and after > before - GAIN
 
 
 def _rungs(

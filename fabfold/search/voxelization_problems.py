@@ -23,10 +23,10 @@ __all__ = ["VoxelizationProblems", "search_order", "usable"]
 
 
 def search_order(options: Sequence[Voxels]) -> list[Voxels]:
-    """Order in which seeds take voxelizations: from the fewest voxels to the most, and again.
+    """Voxelizations from the fewest voxels to the most, and again.
 
-    What leaves much of the template free folds within seconds; what fills it better has to beat
-    that. Of each two neighbours in size one comes in the first turn, the other in the second.
+    What leaves much of the template free folds within seconds. Of each two neighbours in size one
+    comes in the first turn, the other in the second.
     """
     ordered = sorted(options, key=len)
     return ordered[0::2] + ordered[1::2]

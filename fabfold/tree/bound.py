@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.lattice.rotations import ROTATIONS, parity
+from fabfold.lattice.rotations import FACES, ROTATIONS, parity
 from fabfold.lattice.template import Template
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.problem import TreeProblem
@@ -22,8 +22,8 @@ __all__ = ["closed_at_most", "closed_share", "least_surface", "visible_faces"]
 def visible_faces(template: Template) -> int:
     """Number of faces of a template's cells that the filled shape shows."""
     cells = {tuple(cell) for cell in template.cells.tolist()}
-    steps = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
-    return sum((x + i, y + j, z + k) not in cells for x, y, z in cells for i, j, k in steps)
+    beside = (template.cells[:, None] + FACES).reshape(-1, 3)
+    return sum(tuple(cell) not in cells for cell in beside.tolist())
 
 
 def closed_share(tree: FoldTree) -> float:

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from fabfold.tree.beam import fill_beam
 from fabfold.tree.cell_occupancy import list_occupants, random_occupant
-from fabfold.tree.pose_energy import count_defects, energy_of, label_clusters
-from fabfold.tree.possible_hinges import HINGE_ROW, find_hinges, max_hinge_rows
+from fabfold.tree.pose_energy import count_defects, label_clusters
+from fabfold.tree.possible_hinges import HINGE_ROW, max_hinge_rows
 from fabfold.tree.rng import random_below, random_float
-from fabfold.tree.spanning_trees import loose_pieces
+from fabfold.tree.spanning_trees import energy_if_joined
 from fabfold.tree.swept_cells import HingeTables
 from fabfold.tree.tables import Tables
 
@@ -312,13 +312,11 @@ def ruin_and_recreate(
                     break
             if same:
                 continue
-            energy, _ = energy_of(tables, results[r], empty_face)
-            if energy > threshold or energy >= best or count_defects(tables, results[r]) > 0:
-                continue
-            total, rows_found = find_hinges(tables, results[r], hinges, new_label, hinge_rows)
-            left = loose_pieces(hinge_rows[:rows_found], total, 4, generator)
-            energy += piece_penalty * left
-            if energy <= threshold and energy < best:
+            energy, left = energy_if_joined(
+                tables, results[r], empty_face, hinges, piece_penalty, threshold, best, generator,
+                new_label, hinge_rows,
+            )  # fmt: skip
+            if energy < best:
                 best = energy
                 best_row = r
                 best_left = left

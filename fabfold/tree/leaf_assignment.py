@@ -15,10 +15,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.tree.pose_energy import count_defects, energy_of, label_clusters
-from fabfold.tree.possible_hinges import HINGE_ROW, find_hinges, max_hinge_rows
+from fabfold.tree.pose_energy import label_clusters
+from fabfold.tree.possible_hinges import HINGE_ROW, max_hinge_rows
 from fabfold.tree.rng import random_below, random_float
-from fabfold.tree.spanning_trees import loose_pieces
+from fabfold.tree.spanning_trees import energy_if_joined
 from fabfold.tree.swept_cells import HingeTables
 from fabfold.tree.tables import Tables
 
@@ -295,12 +295,10 @@ def reassign_leaves(
                 changed = changed or best_pose[i, c] != pose[voxels[i]]
         if not possible or not changed:
             continue
-        energy, _ = energy_of(tables, out, empty_face)
-        if energy > threshold or count_defects(tables, out) > 0:
-            continue
-        total, rows = find_hinges(tables, out, hinges, label, hinge_rows)
-        left = loose_pieces(hinge_rows[:rows], total, 4, generator)
-        energy += piece_penalty * left
-        if energy <= threshold:
+        energy, left = energy_if_joined(
+            tables, out, empty_face, hinges, piece_penalty, threshold, np.inf, generator, label,
+            hinge_rows,
+        )  # fmt: skip
+        if energy < np.inf:
             return attempt + 1, energy, left
     return tries, np.inf, 0

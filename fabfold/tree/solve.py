@@ -464,7 +464,7 @@ def solve(
     foldability : Foldability
         Judges which trees fold.
     effort : Effort, optional
-        Budgets of the run; by default the normal ones.
+        Budgets of the run; by default those of ``Effort()``.
     statistics : Statistics, optional
         Counts what was done.
     report : callable, optional
@@ -472,7 +472,6 @@ def solve(
     stop : callable, optional
         Asked at every step; the search ends with what it has once it says True. The result
         then depends on when it does.
-
     start : Candidate, optional
         A tree of the problem that folds: it is made better, and no other is grown.
 

@@ -12,12 +12,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.tree.possible_hinges import HingeRows
+from fabfold.tree.pose_energy import count_defects, energy_of
+from fabfold.tree.possible_hinges import HingeRows, find_hinges
 from fabfold.tree.rng import random_float
 from fabfold.tree.swept_cells import HingeTables
 from fabfold.tree.tables import Tables
 
-__all__ = ["loose_pieces", "root_tree", "spanning_tree"]
+__all__ = ["energy_if_joined", "loose_pieces", "root_tree", "spanning_tree"]
 
 #: Added to the random order of double hinges, a uniform(0, 1): single ones are tried first.
 _DOUBLE_DELAY = 0.5
@@ -254,3 +255,60 @@ def loose_pieces(rows: HingeRows, clusters: int, tries: int, generator: NDArray[
         if least == 1:
             break
     return least - 1
+
+
+@njit(cache=True)
+def energy_if_joined(
+    tables: Tables,
+    pose: NDArray[np.int32],
+    empty_face: float,
+    hinges: HingeTables,
+    piece_penalty: float,
+    threshold: float,
+    best: float,
+    generator: NDArray[np.uint64],
+    label: NDArray[np.int32],
+    hinge_rows: HingeRows,
+) -> tuple[float, int]:
+    """Energy of changed poses with the penalty for loose pieces, where they are worth a look.
+
+    Parameters
+    ----------
+    tables : Tables
+        Tables of the problem.
+    pose : (n,) int32 array
+        Full set of poses.
+    empty_face : float
+        Weighted energy of one boundary face of an empty template cell.
+    hinges : HingeTables
+        From :func:`fabfold.tree.swept_cells.hinge_tables`.
+    piece_penalty : float
+        Energy added for each piece, after the first, into which hinges that can turn leave the
+        whole.
+    threshold : float
+        Greatest energy that counts.
+    best : float
+        Only less than this counts.
+    generator : (1,) uint64 array
+        Random state, advanced.
+    label : (n,) int32 array
+        Room for the cluster of each voxel.
+    hinge_rows : (k,) array of :data:`fabfold.tree.possible_hinges.HINGE_ROW`
+        Room for the possible hinges.
+
+    Returns
+    -------
+    energy : float
+        With the penalty; infinite where it does not count, or no tree can join the poses.
+    left : int
+        Pieces, less one, that the penalty counts.
+    """
+    energy, _ = energy_of(tables, pose, empty_face)
+    if energy > threshold or energy >= best or count_defects(tables, pose) > 0:
+        return np.inf, 0
+    clusters, rows = find_hinges(tables, pose, hinges, label, hinge_rows)
+    left = loose_pieces(hinge_rows[:rows], clusters, 4, generator)
+    energy += piece_penalty * left
+    if energy > threshold or energy >= best:
+        return np.inf, 0
+    return energy, left

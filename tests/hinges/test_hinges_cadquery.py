@@ -35,6 +35,7 @@ def test_methods_work_at_every_point_of_the_stack(cq, plugin):
     assert apart.size() == 2
 
 
+@pytest.mark.slow
 def test_bodies_keep_the_clearance(body):
     parent = body(-10).hingeParent(20, clearance=0.3)
     child = body(10).hingeChild(20, clearance=0.3)

@@ -65,6 +65,7 @@ def test_it_prints_without_support(solids):
         assert areas[steep & above].sum() < 0.5
 
 
+@pytest.mark.slow
 def test_the_exact_coupon_agrees(solids):
     coupon = Coupon(FEW)
     assert coupon.names[0] == "frame"
@@ -102,6 +103,7 @@ def test_3mf_is_one_object_so_that_no_slicer_moves_flaps(tmp_path):
     assert model.GetUnit() == lib3mf.ModelUnit.MilliMeter
 
 
+@pytest.mark.slow
 def test_step_holds_every_body_by_name(tmp_path):
     written = write_coupon(tmp_path / "coupon.step", (0.3,), guide=False)
     assert written == [tmp_path / "coupon.step"]

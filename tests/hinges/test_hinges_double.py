@@ -16,6 +16,7 @@ def shells_apart(one, other):
     return one.solid().shells()[0].distance_to(other.solid().shells()[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first", "second"), EDGE_PAIRS)
 def test_the_chain_of_joints_follows_the_poses(first, second):
     options = {"first": first, "second": second, "turns": (180, 90), "clearance": 0.3}
@@ -44,6 +45,7 @@ def test_three_solids_in_every_pose_and_builder():
         DoubleHingeCarve(hinge, "link", mode=Mode.PRIVATE)
 
 
+@pytest.mark.slow
 def test_let_into_two_boxes():
     side = 19.7
     boxes = [Pos(x, 0, 0) * Box(side, side, side) for x in (-10, 10)]
@@ -92,6 +94,7 @@ def _manifold(part):
     return manifold3d.Manifold(manifold3d.Mesh64(part.vertices, part.faces.astype(np.uint64)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("voxel", "knuckles"), [(15, 3), (20, 3), (25, 5), (40, 7)])
 def test_single_meshes_keep_the_clearance(voxel, knuckles):
     found = single_hinge_meshes(voxel, 0.3, knuckles=knuckles)

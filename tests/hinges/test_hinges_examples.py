@@ -31,6 +31,7 @@ def lidded_box():
     return load("07_lidded_box_build123d").main()
 
 
+@pytest.mark.slow
 def test_lidded_box_opens_and_closes(lidded_box):
     box, lid = lidded_box
     assert len(box.solids()) == len(lid.solids()) == 1
@@ -40,6 +41,7 @@ def test_lidded_box_opens_and_closes(lidded_box):
     assert pytest.approx(36.3) == lid.bounding_box().max.Z
 
 
+@pytest.mark.slow
 @needs_cadquery
 def test_the_same_box_in_cadquery(lidded_box):
     box, lid = load("08_lidded_box_cadquery").main()
@@ -49,6 +51,7 @@ def test_the_same_box_in_cadquery(lidded_box):
     assert box.val().distance(lid.val()) == pytest.approx(0.3, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_phone_stand_leans_and_folds():
     module = load("09_phone_stand_build123d")
     base, back, link, lip = bodies = module.main()
@@ -69,12 +72,14 @@ def test_phone_stand_leans_and_folds():
     assert apart(base, lip) >= 0.3 - 1e-5
 
 
+@pytest.mark.slow
 def test_coupon_with_clearances_of_ones_own(capsys):
     coupon = load("10_tolerance_coupon").main()
     assert len(coupon.solids()) == 10
     assert "0.30 mm: plays 0.42 mm across" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "block",
     [pytest.param(b, marks=needs_cadquery if "cadquery" in b else ()) for b in BLOCKS],

@@ -49,6 +49,7 @@ SINGLES = sample(singles(), fits, 20, lambda case: case[2])
 DOUBLES = sample(doubles(), fits_double, 12, lambda case: (case[1] == case[2], case[3]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SINGLES, ids=str)
 def test_single_is_sound_at_every_angle(case):
     plan = plan_of(case)
@@ -63,6 +64,7 @@ def test_single_is_sound_at_every_angle(case):
     np.testing.assert_allclose(in_boxes[:, 0], wanted, atol=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", DOUBLES, ids=str)
 def test_double_is_sound_through_all_sweeps(case):
     plan = double_plan_of(case)
@@ -109,6 +111,7 @@ def test_most_of_the_grid_is_accepted():
     assert sum(not isinstance(plan, HingeError) for plan in plans) > 0.6 * len(plans)
 
 
+@pytest.mark.slow
 def test_exact_and_mesh_halves_have_the_same_volume():
     for case in SINGLES[:4]:
         plan = plan_of(case)

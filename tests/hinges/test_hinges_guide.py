@@ -46,6 +46,7 @@ def test_one_page_of_the_same_bytes_every_time(tmp_path):
     assert pages[0].read_bytes().count(b"/Type /Page\n") == 1
 
 
+@pytest.mark.slow
 def test_it_lies_beside_the_coupon(tmp_path):
     written = write_coupon(tmp_path / "mine.stl", (0.2, 0.35), title="Coupon for fdm-pla-0.4")
     assert written == [tmp_path / "mine.stl", tmp_path / "mine-guide.pdf"]

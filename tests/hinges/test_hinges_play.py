@@ -34,6 +34,7 @@ def furthest(parent, child, direction, most=0.6):
     return low
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pin", [None, StraightPin(0.8)], ids=["cone", "straight"])
 def test_shifts_against_sampled_collisions(pin):
     plan = plan_single(SingleSpec.read(20, clearance=0.3, pin=pin))
@@ -61,6 +62,7 @@ def turned_about(child, direction, tilt, shift):
     return child.transform(np.column_stack([matrix, shift]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", [0.0, 1.0, 2.0])
 def test_tilt_against_sampled_collisions(direction):
     plan = plan_single(SingleSpec.read(20, clearance=0.3))
@@ -78,6 +80,7 @@ def test_tilt_against_sampled_collisions(direction):
     assert 0.0 < tilt < np.radians(8.0)
 
 
+@pytest.mark.slow
 def test_more_clearance_more_play_and_longer_hinge_less_tilt():
     small, large = (play(SingleHinge(25, clearance=c), ANGLE) for c in (0.2, 0.4))
     assert large.radial > small.radial
@@ -91,6 +94,7 @@ def test_a_loose_pin_adds_its_room_on_both_sides():
     assert play(hinge, ANGLE).radial == pytest.approx(0.2, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_chain_adds_up():
     double = DoubleHinge(20, clearance=0.3)
     one = play(SingleHinge(20, clearance=0.3), 90)

@@ -187,6 +187,7 @@ def test_cutter_and_half_in_a_builder():
     assert shells_apart(built.part, other) == pytest.approx(0.3, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_three_lines_let_it_into_two_bodies():
     box, lid = Pos(0, -15, 0) * Box(40, 29.7, 20), Pos(0, 15, 0) * Box(40, 29.7, 20)
     hinge = SingleHinge(40, clearance=0.3)
@@ -292,6 +293,7 @@ def test_a_leaf_with_screw_holes():
     assert lost == pytest.approx(3 * one, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bore", ["teardrop", "octagon"])
 def test_lying_bores_have_no_flat_roof(bore):
     """No face of a bore looks down by more than 45°, but for the teardrop's narrow top."""

@@ -1,0 +1,80 @@
+"""How a stage is run: once, with its progress shown and its cost counted, and kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from fabfold.progress import Listener, Progress, SilentListener, processor_seconds
+from fabfold.store import StageStore
+
+__all__ = ["StageRunner"]
+
+Result = TypeVar("Result")
+
+
+class StageRunner:
+    """Runs stages and keeps their results, in memory and in the kit folder.
+
+    Parameters
+    ----------
+    store : StageStore
+        Finished stages in the kit folder.
+
+    Attributes
+    ----------
+    listener : Listener
+        Is shown the progress of each stage.
+    processor_seconds : dict of str to float
+        What each stage that was made, and not read from the folder, has cost so far, with the
+        processes that it started.
+    """
+
+    def __init__(self, store: StageStore) -> None:
+        self.listener: Listener = SilentListener()
+        self.processor_seconds: dict[str, float] = {}
+        self._store = store
+        self._results: dict[str, Any] = {}
+
+    def _begin(self) -> None:
+        """Do what comes before any stage is made."""
+
+    @contextmanager
+    def _open_progress(self, name: str) -> Iterator[Progress]:
+        """Progress of a stage that is about to be made."""
+        self._begin()
+        start = processor_seconds()
+        try:
+            with self.listener.stage(name) as progress:
+                yield progress
+        finally:
+            stage = name.partition("-")[0]  # the rounds of the search are numbered
+            spent = self.processor_seconds.get(stage, 0.0)
+            self.processor_seconds[stage] = spent + processor_seconds() - start
+
+    def _is_done(self, name: str, key: str) -> bool:
+        """Whether the result of a stage is in memory or in the kit folder."""
+        return name in self._results or self._store.holds(name, key)
+
+    def _stage(
+        self,
+        name: str,
+        key: str,
+        make: Callable[[Progress], Result],
+        save: Callable[[StageStore, Result], list[str]],
+        load: Callable[[StageStore, list[str]], Result],
+    ) -> Result:
+        """Result of a stage: from memory, from the kit folder, or made now and kept."""
+        if name in self._results:
+            result: Result = self._results[name]
+            return result
+        if self._is_done(name, key):
+            result = load(self._store, self._store.files(name))
+        else:
+            with self._open_progress(name) as progress:
+                result = make(progress)
+            if self._store.folder is not None:
+                self._store.record(name, key, save(self._store, result))
+        self._results[name] = result
+        return result
