@@ -99,15 +99,21 @@ class LoosePin(Pin):
         knuckles, `slip` in the others'.
     heads : bool
         Whether both ends are countersunk, for a filament whose ends are melted into heads.
+    entry : {"both", "start", "end", "none"}
+        Ends of the knuckles, by their place along z, beyond which the bodies are cleared so that
+        the pin can go in; "none" leaves the bodies to their owner.
     """
 
     diameter: float
     grip: float = 0.05
     slip: float = 0.15
     heads: bool = False
+    entry: Literal["both", "start", "end", "none"] = "both"
 
     def __post_init__(self) -> None:
         """Refuse what is no pin."""
+        if self.entry not in ("both", "start", "end", "none"):
+            raise HingeError(f"loose pin: entry {self.entry!r}: use both, start, end or none")
         if self.diameter <= 0.0 or self.slip < self.grip:
             raise HingeError(
                 f"loose pin: diameter {self.diameter:g} mm must be above 0 and slip {self.slip:g} "
@@ -176,12 +182,12 @@ class LoosePin(Pin):
         )
 
     def insertion_cuts(self, layout: KnuckleLayout, edge: float) -> tuple[Shape, ...]:
-        """Clear both bodies from the ends of the layout to the ends of the edge."""
+        """Clear both bodies from the entry ends of the layout to the ends of the edge."""
         wide = 0.5 * self.diameter + self.slip + (self._HEAD if self.heads else 0.0)
         return tuple(
             cylinder(wide, *sorted(ends))
-            for ends in ((layout.start, -edge), (layout.end, edge))
-            if abs(ends[1] - ends[0]) > 1e-6
+            for name, ends in (("start", (layout.start, -edge)), ("end", (layout.end, edge)))
+            if self.entry in ("both", name) and abs(ends[1] - ends[0]) > 1e-6
         )
 
     def contact_circles(self, layout: KnuckleLayout) -> tuple[ContactCircle, ...]:
@@ -201,7 +207,7 @@ class FilamentPin(LoosePin):
     ----------
     diameter : float
         Diameter of the filament: 1.75 or 2.85 mm.
-    grip, slip, heads
+    grip, slip, heads, entry
         As for :class:`LoosePin`.
     """
 
@@ -224,7 +230,7 @@ class RodPin(LoosePin):
     ----------
     diameter : float
         Diameter of the rod in mm.
-    grip, slip, heads
+    grip, slip, heads, entry
         As for :class:`LoosePin`.
     """
 

@@ -27,10 +27,9 @@ one and at most 0.0024 (r + c) above it for 64 segments (0.007 mm at r + c = 2.8
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from math import cos, pi
-from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack
+from typing import TYPE_CHECKING, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +37,7 @@ from numpy.typing import NDArray
 from .barrel import default_pin_radius, default_radii
 from .clearance import Clearance
 from .leaf import Bracket
-from .options import BarrelKeywords
+from .options import BarrelKeywords, MeshKeywords, MeshOptions
 from .plan_double import DoubleSpec, plan_double, plate_shape
 from .plan_single import SingleSpec, plan_single
 from .printed_pins import ConePin
@@ -50,8 +49,6 @@ if TYPE_CHECKING:
 __all__ = [
     "DoubleHingeMeshes",
     "HingeMeshes",
-    "MeshKeywords",
-    "MeshOptions",
     "MeshPart",
     "double_hinge_meshes",
     "half_manifolds",
@@ -92,7 +89,7 @@ class HingeMeshes(NamedTuple):
     barrel_radius_mm : float
         Radius of the barrels in mm.
     pin_radius_mm : float
-        Radius at the foot of the cone pins in mm.
+        Radius at the foot of the cone pins, or of the loose pin, in mm.
     knuckles : int
         Number of knuckles.
     reach_mm : float
@@ -126,7 +123,7 @@ class DoubleHingeMeshes(NamedTuple):
     barrel_radius_mm : float
         Radius of the barrels in mm.
     pin_radius_mm : float
-        Radius at the foot of the cone pins in mm.
+        Radius at the foot of the cone pins, or of the loose pin, in mm.
     knuckles : int
         Number of knuckles on each axis; of both together when they share an edge.
     reach_mm : float
@@ -146,53 +143,6 @@ class DoubleHingeMeshes(NamedTuple):
     knuckles: int
     reach_mm: float
     plate_mm: float
-
-
-class MeshKeywords(TypedDict, total=False):
-    """Keywords that :func:`single_hinge_meshes` and :func:`double_hinge_meshes` share."""
-
-    barrel_radius_mm: float | None
-    pin_radius_mm: float | None
-    gap_mm: float | None
-    bracket_mm: float | None
-    margin_mm: float | None
-    wall_mm: float
-    segments: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class MeshOptions:
-    """Sizes of a hinge's meshes; None stands for one that follows from the others.
-
-    Attributes
-    ----------
-    barrel_radius_mm : float, optional
-        Radius of the barrels in mm; :func:`hinges.barrel.default_radii` chooses it when left out.
-    pin_radius_mm : float, optional
-        Radius at the foot of the cone pins in mm; 60 % of the barrel, or as much as the wall
-        leaves, when left out.
-    gap_mm : float, optional
-        Distance between the two bodies in mm; each is inset by half of it. The clearance when left
-        out.
-    bracket_mm : float, optional
-        Width and depth in mm of the square web that joins the knuckles of a half, measured from the
-        axis. When left out the groove and 1.2 mm of material behind it, or 0.15 of the voxel when
-        that is more.
-    margin_mm : float, optional
-        Length in mm left free at each end of the edge; barrel radius plus clearance when left out.
-    wall_mm : float
-        Thinnest wall in mm.
-    segments : int
-        Number of corners of a full circle.
-    """
-
-    barrel_radius_mm: float | None = None
-    pin_radius_mm: float | None = None
-    gap_mm: float | None = None
-    bracket_mm: float | None = None
-    margin_mm: float | None = None
-    wall_mm: float = 0.8
-    segments: int = 64
 
 
 def manifold_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
@@ -297,7 +247,7 @@ def mesh_part(solid: Manifold) -> MeshPart:
 def single_hinge_meshes(
     voxel_mm: float, clearance_mm: float, *, knuckles: int = 3, **options: Unpack[MeshKeywords]
 ) -> HingeMeshes:
-    """Build the four pieces of a cone-pinned single hinge for the edge of a voxel.
+    """Build the four pieces of a single hinge for the edge of a voxel.
 
     Parameters
     ----------
@@ -342,7 +292,7 @@ class _Sizes(NamedTuple):
     """Sizes in mm that both kinds of hinges derive alike, and the same as keywords of a hinge."""
 
     barrel: float
-    pin: float
+    pin_radius: float
     groove: float
     bracket: Bracket
     keywords: BarrelKeywords
@@ -351,21 +301,23 @@ class _Sizes(NamedTuple):
 def _sizes(voxel_mm: float, clearance_mm: float, knuckles: int, options: MeshOptions) -> _Sizes:
     room = Clearance(clearance_mm)
     wall, margin = options.wall_mm, options.margin_mm
-    barrel, pin = options.barrel_radius_mm, options.pin_radius_mm
+    barrel, radius = options.barrel_radius_mm, options.pin_radius_mm
     if barrel is None:
         barrel, _ = default_radii(voxel_mm, room, wall, knuckles, margin, widest=5.0)
-    if pin is None:
-        pin = default_pin_radius(barrel, room, wall)
+    if options.pin is not None:
+        radius = 0.5 * options.pin.diameter
+    elif radius is None:
+        radius = default_pin_radius(barrel, room, wall)
     groove = barrel + room.radial
     bracket = options.bracket_mm
     return _Sizes(
         barrel,
-        pin,
+        radius,
         groove,
         Bracket(max(0.15 * voxel_mm, groove + 1.2) if bracket is None else bracket),
         {
             "radius": barrel,
-            "pin": ConePin(pin),
+            "pin": ConePin(radius) if options.pin is None else options.pin,
             "clearance": room,
             "gap": options.gap_mm,
             "margin": margin,
@@ -389,7 +341,7 @@ def _single(
         mesh_part(parent_carve),
         mesh_part(child_carve),
         sizes.barrel,
-        sizes.pin,
+        sizes.pin_radius,
         knuckles,
         sizes.groove,
     )
@@ -406,7 +358,7 @@ def double_hinge_meshes(
     plate_mm: float | None = None,
     **options: Unpack[MeshKeywords],
 ) -> DoubleHingeMeshes:
-    """Build the five pieces of a cone-pinned double hinge for the face between two voxels.
+    """Build the five pieces of a double hinge for the face between two voxels.
 
     Parameters
     ----------
@@ -492,7 +444,7 @@ def _double(
         mesh_part(child_carve),
         mesh_part(manifold_of(plate_shape(spec), options.segments, outside=False)),
         sizes.barrel,
-        sizes.pin,
+        sizes.pin_radius,
         knuckles,
         sizes.groove,
         spec.plate,

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal, TypedDict
 
 from .clearance import Clearance
+from .hardware import LoosePin
 from .leaf import Bracket, Leaf
 from .pins import Pin
 from .stops import Detents, Stops
@@ -21,6 +22,8 @@ __all__ = [
     "BoreStyle",
     "DoubleHingeKeywords",
     "DoubleHingeOptions",
+    "MeshKeywords",
+    "MeshOptions",
     "SingleHingeKeywords",
     "SingleHingeOptions",
 ]
@@ -103,3 +106,55 @@ class DoubleHingeOptions(BarrelOptions):
     knuckles: int | None = None
     plate: float | None = None
     bracket: Bracket | None = None
+
+
+class MeshKeywords(TypedDict, total=False):
+    """Keywords of hinges that are built as meshes, as of :mod:`hinges.mesh`."""
+
+    barrel_radius_mm: float | None
+    pin_radius_mm: float | None
+    gap_mm: float | None
+    bracket_mm: float | None
+    margin_mm: float | None
+    wall_mm: float
+    segments: int
+    pin: LoosePin | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshOptions:
+    """Sizes of a hinge's meshes; None stands for one that follows from the others.
+
+    Attributes
+    ----------
+    barrel_radius_mm : float, optional
+        Radius of the barrels in mm; :func:`hinges.barrel.default_radii` chooses it when left out.
+    pin_radius_mm : float, optional
+        Radius at the foot of the cone pins in mm; 60 % of the barrel, or as much as the wall
+        leaves, when left out.
+    gap_mm : float, optional
+        Distance between the two bodies in mm; each is inset by half of it. The clearance when left
+        out.
+    bracket_mm : float, optional
+        Width and depth in mm of the square web that joins the knuckles of a half, measured from the
+        axis. When left out the groove and 1.2 mm of material behind it, or 0.15 of the voxel when
+        that is more.
+    margin_mm : float, optional
+        Length in mm left free at each end of the edge; barrel radius plus clearance when left out.
+    wall_mm : float
+        Thinnest wall in mm.
+    segments : int
+        Number of corners of a full circle.
+    pin : LoosePin, optional
+        A pin that is put in after printing, in place of printed cones; `pin_radius_mm` is then its
+        own.
+    """
+
+    barrel_radius_mm: float | None = None
+    pin_radius_mm: float | None = None
+    gap_mm: float | None = None
+    bracket_mm: float | None = None
+    margin_mm: float | None = None
+    wall_mm: float = 0.8
+    segments: int = 64
+    pin: LoosePin | None = None

@@ -1,6 +1,7 @@
 """The first kit that folds, written while the search goes on."""
 
 import json
+from dataclasses import replace
 
 import pytest
 import trimesh
@@ -36,7 +37,7 @@ def found(bar_kit):
 
 def test_a_first_kit_has_bodies_and_the_proof(bar_kit, found, tmp_path):
     listener = Listener()
-    with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.profile(), listener) as early:
+    with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), listener) as early:
         early.start(found)
         early.start(found)
     _, candidate = found
@@ -53,7 +54,7 @@ def test_a_first_kit_has_bodies_and_the_proof(bar_kit, found, tmp_path):
 
 def test_a_kit_that_is_there_is_left_alone(bar_kit, found, tmp_path):
     (tmp_path / "report.json").write_text("{}", "utf-8")
-    with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.profile(), SilentListener()) as early:
+    with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), SilentListener()) as early:
         early.start(found)
     assert [path.name for path in tmp_path.iterdir()] == ["report.json"]
 
@@ -61,7 +62,8 @@ def test_a_kit_that_is_there_is_left_alone(bar_kit, found, tmp_path):
 @pytest.mark.slow
 def test_a_tree_whose_bodies_do_not_come_out_says_why_and_leaves_nothing(bar_kit, found, tmp_path):
     listener = Listener()
-    huge = bar_kit.profile().model_copy(update={"clearance_mm": 4.9})
+    mode = bar_kit.print_mode()
+    huge = replace(mode, profile=mode.profile.model_copy(update={"clearance_mm": 4.9}))
     with EarlyKit(tmp_path, bar_kit.recipe, huge, listener) as early:
         early.start(found)
     assert "Error" in listener.told["early"]

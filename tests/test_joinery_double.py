@@ -25,6 +25,7 @@ from fabfold.kit.checking import run_checks
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.kit.step_process import StepProcess
 from fabfold.kit.writing import write_kit
+from fabfold.printing.print_mode import print_mode
 from fabfold.printing.profiles import load_profile
 from fabfold.progress import SilentProgress
 from fabfold.proof.certify import certify
@@ -285,12 +286,13 @@ def kit(tmp_path_factory):
     made = BuiltTree(
         PlannedTree(voxels, tree, replace(motion, certificate=certificate)), joinery, ()
     )
-    checks = run_checks(made, profile, SilentProgress())
+    mode = print_mode(profile)
+    checks = run_checks(made, mode, SilentProgress())
     folder = tmp_path_factory.mktemp("double")
     solid = Solid("arm", voxels.vertices * VOXEL, voxels.faces)
     recipe = Recipe(model="arm.stl", template="box-2x2x2")
     with StepProcess(folder / "arm.step", joinery, tree) as step:
-        write_kit(folder, recipe, profile, solid, made, checks, SilentProgress(), step.wait)
+        write_kit(folder, recipe, mode, solid, made, checks, SilentProgress(), step.wait)
     return folder, tree, joinery, checks
 
 

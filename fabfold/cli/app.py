@@ -67,7 +67,24 @@ ProfileName = Annotated[
 ]
 ClearanceMm = Annotated[
     float | None,
-    typer.Option("--clearance-mm", help="Gap in hinges and between faces. Default: the profile's."),
+    typer.Option("--clearance-mm", help="Clearance in the hinges. Default: the profile's."),
+]
+Print = Annotated[
+    str | None,
+    typer.Option(
+        "--print",
+        metavar="auto|in-place|apart",
+        help="As one object that is closed (in-place), or body by body on plates, with pins that "
+        "are pushed in (apart). Default: what the profile can (auto).",
+    ),
+]
+PinName = Annotated[
+    str | None,
+    typer.Option(
+        "--pin",
+        metavar="1.75|2.85|rod-2",
+        help="Pin of bodies that are printed apart: a piece of filament, or of rod. Default: 1.75.",
+    ),
 ]
 Seed = Annotated[
     int | None, typer.Option("--seed", help="Seed of every random choice. Default: 1.")
@@ -295,6 +312,8 @@ def _stage(name: str, summary: str) -> None:
         voxel_mm: VoxelMm = None,
         profile: ProfileName = None,
         clearance_mm: ClearanceMm = None,
+        print: Print = None,
+        pin: PinName = None,
         seed: Seed = None,
         effort: Effort = None,
         rounds: Rounds = None,

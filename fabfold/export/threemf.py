@@ -27,7 +27,7 @@ from __future__ import annotations
 import io
 import uuid
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -100,6 +100,8 @@ def write_3mf(
     colours: NDArray[np.uint8] | None = None,
     layout: Layout = "kit",
     thumbnail: bytes | None = None,
+    keep_place: bool = False,
+    settings: Callable[[list[int]], Mapping[str, str]] | None = None,
 ) -> None:
     """Write the bodies as one 3MF file; the same input gives the same bytes.
 
@@ -121,6 +123,12 @@ def write_3mf(
         How the bodies are grouped; see the module's description.
     thumbnail : bytes, optional
         A PNG that file managers and slicers show for the file.
+    keep_place : bool
+        Whether the bodies stay where they are; otherwise they are moved so that all coordinates
+        begin at 0.
+    settings : callable, optional
+        Files of slicer settings by name, in place of the layout's own; it is given the number of
+        each body's object.
 
     Raises
     ------
@@ -158,26 +166,30 @@ def write_3mf(
         body.SetObjectLevelProperty(materials.GetResourceID(), paint)
         body.SetUUID(str(uuid.uuid5(space, name)))
         bodies.append(body)
-    built, settings = bodies, {}
+    built, attached = bodies, {}
     if layout == "kit":
         for body in bodies:
             # PrusaSlicer fails on objects of type "model" that are not built.
             body.SetType(lib3mf.ObjectType.Other)
         whole = _add_whole(lib3mf, model, title, meshes, materials.GetResourceID(), paints)
-        settings = {"Slic3r_PE_model.config": _prusa_config(whole, title, names, meshes)}
+        attached = {"Slic3r_PE_model.config": _prusa_config(whole, title, names, meshes)}
         built = [whole]
     elif layout == "assembly":
         whole = _add_assembly(wrapper, model, title, names, bodies, space)
-        settings = {"model_settings.config": _bambu_config(whole, title, names, bodies)}
+        attached = {"model_settings.config": _bambu_config(whole, title, names, bodies)}
         built = [whole]
     if layout != "apart":
         built[0].SetUUID(str(uuid.uuid5(space, "kit")))
+    if settings is not None:
+        attached = dict(settings([body.GetModelResourceID() for body in bodies]))
     lowest = np.min([vertices.min(axis=0) for vertices, _ in meshes], axis=0)
+    if keep_place:
+        lowest = np.zeros(3)
     place = _translation(lib3mf, -np.round(lowest.astype(float), _DECIMALS))
     for index, entry in enumerate(built):
         item = model.AddBuildItem(entry, place)
         item.SetUUID(str(uuid.uuid5(space, f"item {index}")))
-    _attach(model, settings, thumbnail)
+    _attach(model, attached, thumbnail)
     writer = model.QueryWriter("3mf")
     writer.SetDecimalPrecision(_DECIMALS)
     with replacing(path) as temporary:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fabfold.meshes import mesh_volume
 
-__all__ = ["BodyMesh", "Joinery"]
+__all__ = ["BodyMesh", "Joinery", "PlacedPin"]
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,36 @@ class BodyMesh:
 
 
 @dataclass(frozen=True)
+class PlacedPin:
+    """A pin that is pushed in after printing, in shape A.
+
+    Attributes
+    ----------
+    hinges : tuple of int
+        Indices of the hinges that turn on it.
+    owner : int
+        Index of the body that grips it.
+    tip_mm : (3,) tuple of float
+        Middle of the end that goes in first, mm.
+    tail_mm : (3,) tuple of float
+        Middle of its other end, mm.
+    diameter_mm : float
+        Diameter, mm.
+    """
+
+    hinges: tuple[int, ...]
+    owner: int
+    tip_mm: tuple[float, float, float]
+    tail_mm: tuple[float, float, float]
+    diameter_mm: float
+
+    @property
+    def length_mm(self) -> float:
+        """Length, mm."""
+        return float(np.linalg.norm(np.subtract(self.tail_mm, self.tip_mm)))
+
+
+@dataclass(frozen=True)
 class Joinery:
     """All printed bodies of a kit and how they were made.
 
@@ -50,7 +80,7 @@ class Joinery:
     origin_mm : (3,) tuple of float
         Where the lattice origin lies in shape A, mm: ``origin_mm + voxel_mm * lattice`` gives mm.
     clearance_mm : float
-        Gap between bodies and normal clearance in the hinges, mm.
+        Normal clearance in the hinges, and gap between bodies where `face_gap_mm` is not given, mm.
     barrel_radius_mm : float
         Radius of every barrel, mm.
     pin_radius_mm : float
@@ -73,6 +103,10 @@ class Joinery:
         Volume in mm³ that these corners had at the model's surface.
     rounded_inside_mm3 : float
         Volume in mm³ that these corners had inside the model.
+    face_gap_mm : float or None
+        Gap between the faces of two bodies, mm, where it is not the clearance.
+    pins : tuple of PlacedPin
+        Pins that are pushed in after printing; none where pins are printed.
     """
 
     bodies: tuple[BodyMesh, ...]
@@ -90,3 +124,5 @@ class Joinery:
     rounded_cells: int = 0
     rounded_skin_mm3: float = 0.0
     rounded_inside_mm3: float = 0.0
+    face_gap_mm: float | None = None
+    pins: tuple[PlacedPin, ...] = ()

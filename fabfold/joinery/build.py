@@ -33,6 +33,8 @@ from fabfold.voxels.voxel_model import Voxels
 if TYPE_CHECKING:
     import manifold3d
 
+    from hinges.hardware import LoosePin
+
 __all__ = ["build_bodies"]
 
 #: Barrels and plates pass a cell at its faces; what takes more than this share runs through it.
@@ -49,11 +51,13 @@ def build_bodies(
     barrel_radius_mm: float | None = None,
     pin_radius_mm: float | None = None,
     knuckles: int | None = None,
+    face_gap_mm: float | None = None,
+    pin: LoosePin | None = None,
     progress: Progress | None = None,
 ) -> Joinery:
     """Make the printed bodies of a kit.
 
-    Each body is the warped model inside its own cells, inset by half the clearance from every cell
+    Each body is the warped model inside its own cells, inset by half the gap from every cell
     that is not its own, with its hinge halves added, with grooves and pockets wherever the barrel
     or the link plate of another hinge passes on the folding path, with corners rounded off where
     cells would run into each other, and with struts where the cut left its material in pieces. The
@@ -70,13 +74,18 @@ def build_bodies(
     voxel_mm : float
         Side of a voxel in mm.
     clearance_mm : float
-        Gap between bodies and normal clearance in the hinges, mm.
+        Normal clearance in the hinges, and room around what passes, mm.
     barrel_radius_mm : float, optional
         Radius of the barrels in mm; derived from `voxel_mm` and `clearance_mm` by default.
     pin_radius_mm : float, optional
         Radius of the pins in mm; derived in the same way by default.
     knuckles : int, optional
         Number of knuckles of a single hinge; 3 by default.
+    face_gap_mm : float, optional
+        Gap between the faces of two bodies, mm; the clearance by default.
+    pin : hinges.hardware.LoosePin, optional
+        Pin that is pushed in after printing, in place of printed cones. Its bores are open at both
+        ends; :mod:`fabfold.joinery.loose_pins` clears one and closes the other.
     progress : Progress, optional
         Is told how far the work is.
 
@@ -100,7 +109,9 @@ def build_bodies(
     """
     progress = progress or SilentProgress()
     _check_inputs(voxels, tree, motion, voxel_mm, clearance_mm)
-    size = hinge_size(voxel_mm, clearance_mm, barrel_radius_mm, pin_radius_mm, knuckles)
+    size = hinge_size(
+        voxel_mm, clearance_mm, barrel_radius_mm, pin_radius_mm, knuckles, face_gap_mm, pin
+    )
     progress.update(0.0, "preparing the model and the hinges")
     _refuse_colliding_barrels(tree, motion, size, voxel_mm)
     model = model_manifold(voxels, voxel_mm)
@@ -117,7 +128,7 @@ def build_bodies(
         model,
         hinges.halves,
         voxel_mm=voxel_mm,
-        clearance_mm=clearance_mm,
+        clearance_mm=size.gap_mm,
     )
     tally = BuildTally()
     origin = voxel_mm * (0.5 - tree.source.min(axis=0).astype(float))
@@ -152,6 +163,7 @@ def build_bodies(
         rounded_cells=carved.cells,
         rounded_skin_mm3=round(carved.skin_mm3, 3),
         rounded_inside_mm3=round(carved.inside_mm3, 3),
+        face_gap_mm=None if face_gap_mm is None else float(face_gap_mm),
     )
 
 
@@ -246,7 +258,7 @@ def _body_space(
     cutter: BodyCutter, cells: NDArray[np.int32], model: manifold3d.Manifold, tally: BuildTally
 ) -> manifold3d.Manifold:
     """Where the body may be: its cells, and of those that are shared in B its own octants."""
-    inset = cutter.size.clearance_mm / 2
+    inset = cutter.size.gap_mm / 2
     whole = eroded_cells(cells, cutter.voxel_mm, inset)
     if cutter.tree.octants is None:
         return whole

@@ -11,6 +11,7 @@ import numpy as np
 from fabfold.errors import RecipeError
 
 if TYPE_CHECKING:
+    from hinges.hardware import LoosePin
     from hinges.mesh import DoubleHingeMeshes, HingeMeshes
 
 __all__ = ["MIN_WALL_MM", "HingeSize", "hinge_size", "smallest_voxel", "strut_width"]
@@ -39,6 +40,10 @@ class HingeSize:
         Number of knuckles of a single hinge.
     voxel_mm : float
         Length of the hinged edge, the side of a voxel.
+    gap_mm : float
+        Gap between the faces of two bodies.
+    pin : hinges.hardware.LoosePin or None
+        Pin that is pushed in after printing; None for cones that are printed.
     meshes : hinges.mesh.HingeMeshes
         The four pieces of a single hinge in its own frame.
     """
@@ -48,6 +53,8 @@ class HingeSize:
     clearance_mm: float
     knuckles: int
     voxel_mm: float
+    gap_mm: float
+    pin: LoosePin | None
     meshes: HingeMeshes
 
     @property
@@ -82,7 +89,7 @@ class HingeSize:
 
         knuckles = 5 if second == "+y" else self.knuckles
         pins = [self.pin_radius_mm]
-        if second == "+y":
+        if second == "+y" and self.pin is None:
             pins += [float(pin) for pin in np.arange(self.pin_radius_mm - 0.1, 0.75, -0.1)]
         refusal: FitError | None = None
         for pin in pins:
@@ -95,8 +102,10 @@ class HingeSize:
                     turns,
                     barrel_radius_mm=self.barrel_radius_mm,
                     pin_radius_mm=round(pin, 4),
+                    gap_mm=self.gap_mm,
                     knuckles=knuckles,
                     wall_mm=MIN_WALL_MM,
+                    pin=self.pin,
                 )
             except FitError as error:
                 refusal = refusal or error
@@ -114,6 +123,8 @@ def hinge_size(
     barrel_radius_mm: float | None = None,
     pin_radius_mm: float | None = None,
     knuckles: int | None = None,
+    gap_mm: float | None = None,
+    pin: LoosePin | None = None,
 ) -> HingeSize:
     """Choose the hinge for an edge of a voxel.
 
@@ -132,6 +143,10 @@ def hinge_size(
         Radius of the pin in mm, used as it is.
     knuckles : int, optional
         Number of knuckles; 3 by default.
+    gap_mm : float, optional
+        Gap between the faces of two bodies in mm; the clearance by default.
+    pin : hinges.hardware.LoosePin, optional
+        Pin that is pushed in after printing; its radius is then the pin's.
 
     Returns
     -------
@@ -143,11 +158,12 @@ def hinge_size(
     RecipeError
         If no hinge fits, with the rule that failed and the smallest voxel that would do.
     """
+    gap = float(clearance_mm if gap_mm is None else gap_mm)
     found, reason = _first_fit(
-        float(voxel_mm), float(clearance_mm), barrel_radius_mm, pin_radius_mm, knuckles
+        float(voxel_mm), float(clearance_mm), barrel_radius_mm, pin_radius_mm, knuckles, gap, pin
     )
     if found is None:
-        least = smallest_voxel(clearance_mm)
+        least = smallest_voxel(clearance_mm, gap, pin)
         advice = (
             f"the smallest voxel for this clearance is {least:g} mm"
             if barrel_radius_mm is pin_radius_mm is knuckles is None and least is not None
@@ -164,8 +180,10 @@ def _first_fit(
     voxel_mm: float,
     clearance_mm: float,
     barrel: float | None,
-    pin: float | None,
+    pin_radius: float | None,
     knuckles: int | None,
+    gap_mm: float,
+    pin: LoosePin | None,
 ) -> tuple[HingeSize | None, str]:
     """The first size that fits, or None and the rule that the first try broke."""
     from hinges.exceptions import HingeError
@@ -188,9 +206,11 @@ def _first_fit(
                 voxel_mm,
                 clearance_mm,
                 barrel_radius_mm=radius,
-                pin_radius_mm=thick if pin is None else pin,
+                pin_radius_mm=thick if pin_radius is None else pin_radius,
+                gap_mm=gap_mm,
                 knuckles=count,
                 wall_mm=MIN_WALL_MM,
+                pin=pin,
             )
         except HingeError as error:
             reason = reason or str(error)
@@ -202,6 +222,8 @@ def _first_fit(
                 clearance_mm,
                 count,
                 voxel_mm,
+                gap_mm,
+                pin,
                 meshes,
             ),
             "",
@@ -210,20 +232,27 @@ def _first_fit(
 
 
 @lru_cache(maxsize=32)
-def smallest_voxel(clearance_mm: float) -> float | None:
+def smallest_voxel(
+    clearance_mm: float, gap_mm: float | None = None, pin: LoosePin | None = None
+) -> float | None:
     """Smallest voxel in whole mm that holds a hinge of this clearance; None above 60 mm.
 
     Parameters
     ----------
     clearance_mm : float
         Normal clearance in the hinge in mm.
+    gap_mm : float, optional
+        Gap between the faces of two bodies in mm; the clearance by default.
+    pin : hinges.hardware.LoosePin, optional
+        Pin that is pushed in after printing.
 
     Returns
     -------
     float or None
         Side of the voxel in mm.
     """
+    gap = clearance_mm if gap_mm is None else gap_mm
     for side in range(4, 61):
-        if _first_fit(float(side), clearance_mm, None, None, None)[0] is not None:
+        if _first_fit(float(side), clearance_mm, None, None, None, gap, pin)[0] is not None:
             return float(side)
     return None

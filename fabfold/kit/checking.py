@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from fabfold.joinery.loose_pins import meshes_with_pins
 from fabfold.kit.stages import BuiltTree
 from fabfold.printing.body_checks import check_bodies
 from fabfold.printing.checks import Check
+from fabfold.printing.print_mode import PrintMode
 from fabfold.printing.profiles import Profile
 from fabfold.progress import Progress
 from fabfold.proof.replay import replay
@@ -26,15 +28,15 @@ CARVED_LIMIT = 5.0
 _OVERLAP_MM3 = 1e-3
 
 
-def run_checks(built: BuiltTree, profile: Profile, progress: Progress) -> list[Check]:
+def run_checks(built: BuiltTree, mode: PrintMode, progress: Progress) -> list[Check]:
     """Check the tree, the certificate, the printed bodies, samples of the path and the replay.
 
     Parameters
     ----------
     built : BuiltTree
         The tree with its certificate, and its printed bodies.
-    profile : Profile
-        Limits of the printer and material.
+    mode : PrintMode
+        How it is printed, with the limits of printer and material.
     progress : Progress
         Hears what is being checked.
 
@@ -44,6 +46,7 @@ def run_checks(built: BuiltTree, profile: Profile, progress: Progress) -> list[C
         Each with its figure, limit, unit and verdict.
     """
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
+    profile = mode.profile
     faults = check_tree(tree)
     certificate = motion.certificate
     checks = [
@@ -74,6 +77,13 @@ def run_checks(built: BuiltTree, profile: Profile, progress: Progress) -> list[C
     ]
     if joinery.rounded_cells:
         checks.append(_rounded(built))
+    if built.apart is None:
+        checks.append(_lies(mode))
+    else:
+        from fabfold.apart.apart_checks import check_apart
+
+        progress.update(0.05, "putting it together")
+        checks += check_apart(tree, joinery, built.apart)
     progress.update(0.1, "printability")
     checks += check_bodies(joinery, tree, motion, profile, progress)
     progress.update(0.5, "every degree of the path")
@@ -103,6 +113,24 @@ def run_checks(built: BuiltTree, profile: Profile, progress: Progress) -> list[C
     return checks
 
 
+def _lies(mode: PrintMode) -> Check:
+    """Whether the printer can make the closed kit as one object."""
+    able = mode.profile.in_place
+    return Check(
+        name="prints as it lies",
+        figure=float(able),
+        limit=1.0,
+        unit="",
+        ok=able,
+        note=(
+            mode.why
+            if able
+            else f"{mode.profile.name} fuses the gap under every face of the closed kit; print it "
+            "body by body with --print apart, or take a powder profile such as mjf-pa12"
+        ),
+    )
+
+
 def _rounded(built: BuiltTree) -> Check:
     """How much was carved so that cells pass each other."""
     joinery = built.joinery
@@ -125,7 +153,10 @@ def _sampled(built: BuiltTree, profile: Profile) -> list[Check]:
     seen = sample_path(
         tree.to_json(joinery.voxel_mm, joinery.origin_mm),
         motion.to_json(),
-        {body.name: (body.vertices, body.faces) for body in joinery.bodies},
+        {
+            body.name: mesh
+            for body, mesh in zip(joinery.bodies, meshes_with_pins(joinery), strict=True)
+        },
         step_deg=STEP_DEG,
         gap_step_deg=GAP_STEP_DEG,
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fabfold.fold.motion import motion_of
 from fabfold.kit.stages import PlannedTree, build
-from fabfold.printing.profiles import Profile
+from fabfold.printing.print_mode import PrintMode
 from fabfold.progress import Listener
 from fabfold.recipe.recipe import Recipe
 from fabfold.search.processes import module_call
@@ -35,14 +35,14 @@ class EarlyKit:
         Kit folder.
     recipe : Recipe
         Names the files and has the size of a voxel.
-    profile : Profile
-        Printer and material.
+    mode : PrintMode
+        How the kit is printed.
     listener : Listener
         Shows that the kit is there.
     """
 
-    def __init__(self, folder: Path, recipe: Recipe, profile: Profile, listener: Listener) -> None:
-        self._folder, self._recipe, self._profile = folder, recipe, profile
+    def __init__(self, folder: Path, recipe: Recipe, mode: PrintMode, listener: Listener) -> None:
+        self._folder, self._recipe, self._mode = folder, recipe, mode
         self._listener = listener
         self._thread: threading.Thread | None = None
 
@@ -66,7 +66,7 @@ class EarlyKit:
             self._thread.join()
 
     def _make(self, planned: PlannedTree) -> None:
-        work = pickle.dumps((planned, self._profile, self._recipe, self._folder))
+        work = pickle.dumps((planned, self._mode, self._recipe, self._folder))
         command, environment = module_call("fabfold.kit.early")
         with self._listener.stage("early") as progress:
             done = subprocess.run(
@@ -88,7 +88,7 @@ def write_early(work: bytes) -> None:
     Parameters
     ----------
     work : bytes
-        Pickle of the planned tree, the profile, the recipe and the folder.
+        Pickle of the planned tree, the print mode, the recipe and the folder.
 
     Raises
     ------
@@ -98,9 +98,9 @@ def write_early(work: bytes) -> None:
     from fabfold.kit.writing import write_printable
     from fabfold.progress import SilentProgress
 
-    planned, profile, recipe, folder = pickle.loads(work)
-    built = build(planned, profile, recipe.voxel_mm, (), SilentProgress())
-    write_printable(folder, recipe, profile, built)
+    planned, mode, recipe, folder = pickle.loads(work)
+    built = build(planned, mode, recipe.voxel_mm, (), SilentProgress())
+    write_printable(folder, recipe, mode, built)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fabfold.lattice.template import Template
-from fabfold.printing.profiles import Profile
+from fabfold.printing.print_mode import PrintMode
 from fabfold.recipe.recipe import Recipe
 from fabfold.recipe.recipe_wishes import wished
 from fabfold.store import stage_key
@@ -54,21 +54,24 @@ def fold_key(recipe: Recipe, template: Template, mark: list[Any]) -> str:
     )
 
 
-def join_key(recipe: Recipe, template: Template, profile: Profile, mark: list[Any]) -> str:
+def join_key(recipe: Recipe, template: Template, mode: PrintMode, mark: list[Any]) -> str:
     """Key of the printed bodies.
 
     Parameters
     ----------
     recipe, template, mark
         As of :func:`fold_key`.
-    profile : Profile
-        Printer and material, with the clearance that the recipe asks for.
+    mode : PrintMode
+        How the kit is printed, with the clearance that the recipe asks for.
     """
     return stage_key(
-        fold_key(recipe, template, mark), recipe.voxel_mm, profile.model_dump(mode="json")
+        fold_key(recipe, template, mark),
+        recipe.voxel_mm,
+        mode.profile.model_dump(mode="json"),
+        [mode.name, *([mode.pin] if mode.apart else [])],
     )
 
 
-def check_key(recipe: Recipe, template: Template, profile: Profile, mark: list[Any]) -> str:
+def check_key(recipe: Recipe, template: Template, mode: PrintMode, mark: list[Any]) -> str:
     """Key of the checks; parameters as of :func:`join_key`."""
-    return stage_key(join_key(recipe, template, profile, mark), "check")
+    return stage_key(join_key(recipe, template, mode, mark), "check")

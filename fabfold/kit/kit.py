@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from fabfold.kit.box_closure import BoxClosure
     from fabfold.kit.early import EarlyKit
     from fabfold.printing.checks import Check
+    from fabfold.printing.print_mode import PrintMode
     from fabfold.printing.profiles import Profile
     from fabfold.search.kernels import KernelCompiler
     from fabfold.search.pareto import Solution
@@ -221,14 +222,14 @@ class Kit(StageRunner):
         """
         from fabfold.kit.stage_files import load_built, save_built
 
-        profile = self.profile()
+        mode = self.print_mode()
         best = self.fold()
 
         def make(progress: Progress) -> BuiltTree:
             trees = chain([best], islice(self._planned_trees(), 1, None))
-            return build_first(trees, profile, self.recipe.voxel_mm, progress)
+            return build_first(trees, mode, self.recipe.voxel_mm, progress)
 
-        key = keys.join_key(self.recipe, self._template, profile, self._mark())
+        key = keys.join_key(self.recipe, self._template, mode, self._mark())
         return self._stage("join", key, make, save_built, load_built)
 
     def check(self) -> list[Check]:
@@ -236,16 +237,16 @@ class Kit(StageRunner):
         from fabfold.kit.checking import run_checks
         from fabfold.kit.stage_files import load_checks, save_checks
 
-        profile = self.profile()
+        mode = self.print_mode()
         built = self.join()
 
         def make(progress: Progress) -> list[Check]:
-            checks = run_checks(built, profile, progress)
+            checks = run_checks(built, mode, progress)
             bad = [check for check in checks if not check.ok]
             progress.update(1.0, f"{len(checks) - len(bad)} of {len(checks)} passed")
             return checks
 
-        key = keys.check_key(self.recipe, self._template, profile, self._mark())
+        key = keys.check_key(self.recipe, self._template, mode, self._mark())
         return self._stage("check", key, make, save_checks, load_checks)
 
     def export(self, folder: str | Path | None = None) -> Path:
@@ -269,9 +270,9 @@ class Kit(StageRunner):
         if target is None:
             raise KitError("where to? Give a folder to export to")
         require_free_folder(target)
-        profile = self.profile()
+        mode = self.print_mode()
         if target == self.folder and not self.recipe.pick:
-            with EarlyKit(target, self.recipe, profile, self.listener) as self._early:
+            with EarlyKit(target, self.recipe, mode, self.listener) as self._early:
                 self.fold()
         built = self.join()
         path, tree = target / f"{self.recipe.name}.step", built.planned.tree
@@ -279,7 +280,7 @@ class Kit(StageRunner):
             checks = self.check()
             with self._open_progress("export") as progress:
                 write_kit(
-                    target, self.recipe, profile, self.cut_solid(), built, checks, progress,
+                    target, self.recipe, mode, self.cut_solid(), built, checks, progress,
                     step.wait, self.wish_report(built.planned, built.joinery), self._template,
                     self.box_closure(built.planned),
                 )  # fmt: skip
@@ -297,14 +298,19 @@ class Kit(StageRunner):
 
     # How the stages hang together ---------------------------------------------------------------
 
-    def profile(self) -> Profile:
-        """Printer profile, with the recipe's clearance where it gives one."""
+    def print_mode(self) -> PrintMode:
+        """How the kit is printed, with the clearance of the recipe where it gives one."""
+        from fabfold.printing.print_mode import print_mode
         from fabfold.printing.profiles import load_profile
 
-        profile = load_profile(self.recipe.profile)
-        if self.recipe.clearance_mm is not None:
-            profile = profile.model_copy(update={"clearance_mm": self.recipe.clearance_mm})
-        return profile
+        recipe = self.recipe
+        return print_mode(
+            load_profile(recipe.profile), recipe.print, recipe.pin, recipe.clearance_mm
+        )
+
+    def profile(self) -> Profile:
+        """Printer profile, with the gaps of the way in which the kit is printed."""
+        return self.print_mode().profile
 
     def _keep_template(self, store: StageStore) -> None:
         if self._template_file is not None:

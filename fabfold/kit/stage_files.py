@@ -10,7 +10,7 @@ import numpy as np
 
 from fabfold.files import write_json, write_npz
 from fabfold.fold.motion import Motion
-from fabfold.joinery.bodies import BodyMesh, Joinery
+from fabfold.joinery.bodies import BodyMesh, Joinery, PlacedPin
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.printing.checks import Check
 from fabfold.solid.closed_solid import Paint, Solid
@@ -33,8 +33,8 @@ __all__ = [
 ]
 
 
-#: The model, and the thicker one where it was thickened.
-_SOLID, _THICK = "solid.npz", "cut-solid.npz"
+#: The model, the thicker one where it was thickened, and what is told of it.
+_SOLID, _THICK, _CUT = "solid.npz", "cut-solid.npz", "cut.json"
 
 
 def save_solid(store: StageStore, solid: Solid) -> list[str]:
@@ -76,16 +76,16 @@ def save_cut(store: StageStore, cut: Cut) -> list[str]:
     names = [f"voxels-{index:02d}.npz" for index in range(len(cut.options))]
     for name, voxels in zip(names, cut.options, strict=True):
         save_voxels(store.path(name), voxels)
-    write_json(store.path("cut.json"), {"wanted": cut.wanted, "least": cut.least})
-    return ["cut.json", *names, *(_save_mesh(store, _THICK, cut.solid) if cut.wanted else [])]
+    write_json(store.path(_CUT), {"wanted": cut.wanted, "least": cut.least})
+    return [_CUT, *names, *(_save_mesh(store, _THICK, cut.solid) if cut.wanted else [])]
 
 
 def load_cut(store: StageStore, files: list[str]) -> Cut:
     """Read what :func:`save_cut` wrote."""
-    data = json.loads(store.path(files[0]).read_text(encoding="utf-8"))
+    data = json.loads(store.path(_CUT).read_text(encoding="utf-8"))
     return Cut(
         _load_mesh(store, _THICK if _THICK in files else _SOLID),
-        [load_voxels(store.path(name)) for name in files[1:] if name != _THICK],
+        [load_voxels(store.path(name)) for name in sorted(files) if name not in (_CUT, _THICK)],
         float(data["wanted"]),
         float(data["least"]),
     )
@@ -123,13 +123,15 @@ def save_built(store: StageStore, built: BuiltTree) -> list[str]:
         "tree": tree.to_json(joinery.voxel_mm, joinery.origin_mm),
         "motion": built.planned.motion.to_json(),
         "refused": list(built.refused),
+        "apart": None if built.apart is None else built.apart.to_json(),
+        "pins": [dataclasses.asdict(pin) for pin in joinery.pins],
     }
     write_json(store.path("made.json"), content)
     save_voxels(store.path("made-voxels.npz"), built.planned.voxels)
     about: dict[str, Any] = {
         field.name: getattr(joinery, field.name)
         for field in dataclasses.fields(joinery)
-        if field.name != "bodies"
+        if field.name not in ("bodies", "pins")
     }
     arrays = {"about": np.array([json.dumps(about)])}
     for index, body in enumerate(joinery.bodies):
@@ -142,6 +144,8 @@ def save_built(store: StageStore, built: BuiltTree) -> list[str]:
 
 def load_built(store: StageStore, files: list[str]) -> BuiltTree:
     """Read what :func:`save_built` wrote."""
+    from fabfold.apart.apart_kit import ApartKit
+
     data = json.loads(store.path("made.json").read_text(encoding="utf-8"))
     planned = PlannedTree(
         load_voxels(store.path("made-voxels.npz")),
@@ -157,7 +161,16 @@ def load_built(store: StageStore, files: list[str]) -> BuiltTree:
             BodyMesh(str(arrays[f"name_{i}"][0]), arrays[f"vertices_{i}"], arrays[f"faces_{i}"])
             for i in range(count)
         )
-    return BuiltTree(planned, Joinery(bodies=bodies, **about), tuple(data["refused"]))
+    pins = tuple(
+        PlacedPin(**{key: _as_tuple(value) for key, value in pin.items()}) for pin in data["pins"]
+    )
+    apart = None if data["apart"] is None else ApartKit.from_json(data["apart"])
+    joinery = Joinery(bodies=bodies, pins=pins, **about)
+    return BuiltTree(planned, joinery, tuple(data["refused"]), apart)
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
 
 
 def save_checks(store: StageStore, checks: list[Check]) -> list[str]:

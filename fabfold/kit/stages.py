@@ -14,7 +14,8 @@ from fabfold.tree.fold_tree import FoldTree
 from fabfold.voxels.voxel_model import Voxels
 
 if TYPE_CHECKING:
-    from fabfold.printing.profiles import Profile
+    from fabfold.apart.apart_kit import ApartKit
+    from fabfold.printing.print_mode import PrintMode
 
 __all__ = ["BuiltTree", "PlannedTree", "build", "build_first"]
 
@@ -40,16 +41,19 @@ class BuiltTree:
         The printed bodies.
     refused : tuple of str
         Why each better-ranked tree was passed over.
+    apart : ApartKit or None
+        Order of assembly and plates of a kit that is printed body by body.
     """
 
     planned: PlannedTree
     joinery: Joinery
     refused: tuple[str, ...]
+    apart: ApartKit | None = None
 
 
 def build(
     planned: PlannedTree,
-    profile: Profile,
+    mode: PrintMode,
     voxel_mm: float,
     refused: tuple[str, ...],
     progress: Progress,
@@ -60,8 +64,8 @@ def build(
     ----------
     planned : PlannedTree
         The tree, its voxels and its path on the lattice.
-    profile : Profile
-        Clearance of the hinges, and the gap to certify.
+    mode : PrintMode
+        How it is printed; clearance of the hinges, and the gap to certify.
     voxel_mm : float
         Printed side of a voxel.
     refused : tuple of str
@@ -72,36 +76,44 @@ def build(
     Raises
     ------
     GeometryError
-        If this tree cannot be built.
+        If this tree cannot be built, or not put together.
     CheckError
-        If its bodies come too near to each other on the path.
+        If its bodies come too near to each other on the path, or fit no plate.
     """
     from fabfold.joinery.build import build_bodies
+    from fabfold.joinery.loose_pins import meshes_with_pins
     from fabfold.proof.certify import certify
 
+    profile, apart = mode.profile, None
     joinery = build_bodies(
         planned.voxels,
         planned.tree,
         planned.motion,
         voxel_mm=voxel_mm,
         clearance_mm=profile.clearance_mm,
+        face_gap_mm=mode.face_gap_mm,
+        pin=mode.loose_pin(),
         progress=progress,
     )
+    if mode.apart:
+        from fabfold.apart.apart_kit import prepare_apart
+
+        joinery, apart = prepare_apart(planned.tree, planned.motion, joinery, profile, progress)
     certificate = certify(
         planned.tree,
         planned.motion,
-        [(body.vertices, body.faces) for body in joinery.bodies],
+        meshes_with_pins(joinery),
         voxel_mm=joinery.voxel_mm,
         origin_mm=joinery.origin_mm,
         min_gap_mm=profile.min_gap_mm,
         progress=progress,
     )
     motion = replace(planned.motion, certificate=certificate)
-    return BuiltTree(replace(planned, motion=motion), joinery, refused)
+    return BuiltTree(replace(planned, motion=motion), joinery, refused, apart)
 
 
 def build_first(
-    trees: Iterable[PlannedTree], profile: Profile, voxel_mm: float, progress: Progress
+    trees: Iterable[PlannedTree], mode: PrintMode, voxel_mm: float, progress: Progress
 ) -> BuiltTree:
     """Build the first of several trees that survives on real bodies.
 
@@ -109,8 +121,8 @@ def build_first(
     ----------
     trees : iterable of PlannedTree
         Best first.
-    profile : Profile
-        Printer and material.
+    mode : PrintMode
+        How it is printed.
     voxel_mm : float
         Printed side of a voxel, mm.
     progress : Progress
@@ -129,7 +141,7 @@ def build_first(
     refused: list[str] = []
     for planned in trees:
         try:
-            return build(planned, profile, voxel_mm, tuple(refused), progress)
+            return build(planned, mode, voxel_mm, tuple(refused), progress)
         except (GeometryError, CheckError) as error:
             refused.append(str(error))
             progress.update(None, f"tree {len(refused)} refused: {error}")

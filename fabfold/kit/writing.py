@@ -20,7 +20,7 @@ from fabfold.kit.box_closure import BoxClosure
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.lattice.template import Template
 from fabfold.printing.checks import Check
-from fabfold.printing.profiles import Profile
+from fabfold.printing.print_mode import PrintMode
 from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
 from fabfold.search.pareto import Solution
@@ -114,9 +114,29 @@ def kit_summary(
         "dropped_mm3": round(joinery.dropped_mm3, 2),
         "struts": joinery.struts,
         "volume_mm3": round(sum(body.volume for body in joinery.bodies), 1),
+        "print": "in-place" if built.apart is None else "apart",
+        **_printed_apart(built),
         "notes": list(joinery.notes),
         "refused_trees": list(built.refused),
         **({"wishes": list(wishes)} if wishes else {}),
+    }
+
+
+def _printed_apart(built: BuiltTree) -> dict[str, Any]:
+    """Figures of pins and plates, where the kit is printed body by body."""
+    joinery, apart = built.joinery, built.apart
+    if apart is None:
+        return {}
+    names = [body.name for body in joinery.bodies]
+    return {
+        "face_gap_mm": joinery.face_gap_mm,
+        "pins": len(joinery.pins),
+        "pin_mm": 2 * joinery.pin_radius_mm,
+        "plates": apart.plates.count,
+        "bodies_with_support": [names[e.body] for e in apart.plates.laid if e.supported],
+        "bodies_with_brim": [
+            names[e.body] for e in apart.plates.laid if e.topples and not e.supported
+        ],
     }
 
 
@@ -157,8 +177,8 @@ def write_built(folder: Path, built: BuiltTree) -> None:
     write_stl(folder / "bodies", joinery)
 
 
-def write_printable(folder: Path, recipe: Recipe, profile: Profile, built: BuiltTree) -> None:
-    """Write the tree, its certified motion, and the bodies as STL and 3MF.
+def write_printable(folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltTree) -> None:
+    """Write the tree, its certified motion, the bodies as STL and 3MF, and what to buy.
 
     Parameters
     ----------
@@ -166,28 +186,31 @@ def write_printable(folder: Path, recipe: Recipe, profile: Profile, built: Built
         Kit folder.
     recipe : Recipe
         Names the files.
-    profile : Profile
-        Printer and material, named in the 3MF.
+    mode : PrintMode
+        How it is printed; the profile is named in the 3MF.
     built : BuiltTree
         What is written.
     """
+    from fabfold.apart.plate_files import remove_plates, write_bill, write_plates
+
     tree, joinery = built.planned.tree, built.joinery
-    name = recipe.name
+    name, colours = recipe.name, body_colours(tree)
+    metadata = {
+        "Application": f"fabfold {__version__}",
+        "Description": (
+            f"{len(tree.bodies)} bodies, {len(tree.hinges)} hinges, voxel "
+            f"{joinery.voxel_mm:g} mm, clearance {joinery.clearance_mm:g} mm, "
+            f"profile {mode.profile.name}, seed {recipe.seed}"
+        ),
+    }
     write_built(folder, built)
-    write_3mf(
-        folder / f"{name}.3mf",
-        joinery,
-        title=f"{name} folds into {tree.template.name}",
-        metadata={
-            "Application": f"fabfold {__version__}",
-            "Description": (
-                f"{len(tree.bodies)} bodies, {len(tree.hinges)} hinges, voxel "
-                f"{joinery.voxel_mm:g} mm, clearance {joinery.clearance_mm:g} mm, "
-                f"profile {profile.name}, seed {recipe.seed}"
-            ),
-        },
-        colours=body_colours(tree),
-    )
+    if built.apart is not None:
+        write_plates(folder, name, tree, joinery, built.apart, colours, metadata)
+    else:
+        remove_plates(folder, name)
+        title = f"{name} folds into {tree.template.name}"
+        write_3mf(folder / f"{name}.3mf", joinery, title=title, metadata=metadata, colours=colours)
+    write_bill(folder, joinery, mode.profile.material, mode.pin)
 
 
 def write_checks(
@@ -205,7 +228,7 @@ def write_checks(
 def write_kit(
     folder: Path,
     recipe: Recipe,
-    profile: Profile,
+    mode: PrintMode,
     solid: Solid,
     built: BuiltTree,
     checks: list[Check],
@@ -223,8 +246,8 @@ def write_kit(
         Made where it is missing; files of an older export are replaced one by one.
     recipe : Recipe
         Written as ``kit.toml``; names the files.
-    profile : Profile
-        Printer and material, named in the 3MF.
+    mode : PrintMode
+        How it is printed.
     solid : Solid
         The model; its repairs are told in the report.
     built : BuiltTree
@@ -247,7 +270,7 @@ def write_kit(
     colours = body_colours(tree)
     write_text(folder / "kit.toml", recipe.to_toml())
     progress.update(0.1, "bodies and 3MF")
-    write_printable(folder, recipe, profile, built)
+    write_printable(folder, recipe, mode, built)
     flat = None if template is None else flat_poses(joinery, tree, motion, template)
     if template is not None and flat is not None:
         write_3mf(

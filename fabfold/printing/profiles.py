@@ -11,7 +11,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from fabfold.errors import RecipeError
 from fabfold.files import data_folder
 
-__all__ = ["DEFAULT_PROFILE", "Profile", "load_profile", "profile_names", "profiles_folder"]
+__all__ = [
+    "DEFAULT_PROFILE",
+    "ApartFit",
+    "Profile",
+    "load_profile",
+    "profile_names",
+    "profiles_folder",
+]
 
 #: A kit is printed closed, as the model, with a gap under every face. Powder carries those faces
 #: and blows out of the gaps; Multi Jet Fusion does so with the narrower gap of the two nylon
@@ -20,6 +27,44 @@ DEFAULT_PROFILE = "mjf-pa12"
 
 #: A length of a profile in mm.
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
+
+
+class ApartFit(BaseModel):
+    """Gaps of a kit whose bodies are printed one by one and joined by loose pins, mm.
+
+    Attributes
+    ----------
+    clearance_mm : float
+        Normal clearance in the hinges.
+    face_gap_mm : float
+        Gap between the faces of two bodies.
+    min_gap_mm : float
+        Smallest gap on the folding path: what the printer may be off.
+    grip_mm, slip_mm : float
+        How much wider than the pin the bores are, in radius: of the body that grips it, and of the
+        others.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    clearance_mm: Annotated[float, Field(gt=0.0, le=5.0)] = 0.3
+    face_gap_mm: Annotated[float, Field(gt=0.0, le=5.0)] = 0.2
+    min_gap_mm: Annotated[float, Field(gt=0.0, le=5.0)] = 0.1
+    grip_mm: Annotated[float, Field(ge=0.0, le=1.0)] = 0.1
+    slip_mm: Annotated[float, Field(gt=0.0, le=1.0)] = 0.2
+
+    @model_validator(mode="after")
+    def _in_order(self) -> ApartFit:
+        if self.grip_mm > self.slip_mm:
+            raise ValueError(
+                f"grip_mm ({self.grip_mm:g}) must not be above slip_mm ({self.slip_mm:g})"
+            )
+        if self.min_gap_mm >= min(self.face_gap_mm, self.slip_mm, self.clearance_mm):
+            raise ValueError(
+                f"min_gap_mm ({self.min_gap_mm:g}) must be below face_gap_mm, slip_mm and "
+                "clearance_mm"
+            )
+        return self
 
 
 class Profile(BaseModel):
@@ -54,6 +99,8 @@ class Profile(BaseModel):
         every face.
     bed_mm : (float, float, float) or None
         Build volume along x, y and z, mm.
+    apart : ApartFit
+        Gaps where the bodies are printed one by one.
     sources : tuple of str
         Where the figures come from.
     """
@@ -72,6 +119,7 @@ class Profile(BaseModel):
     max_overhang_deg: Annotated[float, Field(ge=0.0, le=90.0)] | None = None
     in_place: bool
     bed_mm: tuple[Length, Length, Length] | None = None
+    apart: ApartFit = ApartFit()
     sources: tuple[str, ...] = ()
 
     @model_validator(mode="after")

@@ -50,8 +50,16 @@ class Recipe(BaseModel):
     profile: Annotated[str, Field(description="printer and material, or a .toml file")] = "mjf-pa12"
     clearance_mm: Annotated[
         float | None,
-        Field(gt=0, le=5, description="gap in hinges and faces; default: the profile's"),
+        Field(gt=0, le=5, description="clearance in hinges; default: the profile's"),
     ] = None
+    print: Annotated[
+        Literal["auto", "in-place", "apart"],
+        Field(description="in-place as one object, apart body by body; auto: as the profile can"),
+    ] = "auto"
+    pin: Annotated[
+        Literal["1.75", "2.85", "rod-2"],
+        Field(description="loose pin of bodies printed apart: filament 1.75 or 2.85, rod-2"),
+    ] = "1.75"
     seed: Annotated[int, Field(ge=0, lt=2**31, description="seed of every random choice")] = 1
     effort: Annotated[
         Literal["quick", "normal", "thorough"], Field(description="how long the search goes on")

@@ -1,0 +1,280 @@
+"""Files of a kit that is printed body by body: plates, the order of assembly, and what to buy."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.apart.apart_kit import ApartKit
+from fabfold.apart.plates import Plates, on_plate
+from fabfold.export.threemf import write_3mf
+from fabfold.files import write_json, write_text
+from fabfold.joinery.bodies import Joinery
+from fabfold.printing.print_mode import PINS
+from fabfold.tree.fold_tree import FoldTree
+
+__all__ = ["assembly_data", "bill_rows", "remove_plates", "write_bill", "write_plates"]
+
+#: Between two plates Bambu Studio leaves a fifth of a plate.
+_STRIDE = 1.2
+#: The release of Bambu Studio whose form of plates is written.
+_BAMBU = "BambuStudio-01.09.00.00"
+
+
+def write_plates(
+    folder: Path,
+    name: str,
+    tree: FoldTree,
+    joinery: Joinery,
+    kit: ApartKit,
+    colours: NDArray[np.uint8],
+    metadata: Mapping[str, str],
+) -> None:
+    """Write the plates for any slicer, all of them for Bambu Studio, and the order of assembly.
+
+    Parameters
+    ----------
+    folder : Path
+        Kit folder.
+    name : str
+        Stem of the files' names.
+    tree : FoldTree
+        The bodies and their hinges.
+    joinery : Joinery
+        The bodies as they are printed, with their pins.
+    kit : ApartKit
+        Order and plates.
+    colours : (b, 3) uint8 array
+        Colour of each body, sRGB.
+    metadata : mapping of str to str
+        Facts about the files.
+    """
+    plates = kit.plates
+    remove_plates(folder, name, keep=plates.count)
+    for index in range(plates.count):
+        on = plates.plate == index
+        write_3mf(
+            folder / f"plate-{index + 1}.3mf",
+            on_plate(joinery, plates, index),
+            title=f"{name}, plate {index + 1} of {plates.count}",
+            metadata=metadata,
+            colours=colours[on],
+            layout="apart",
+            keep_place=True,
+        )
+    spread = _side_by_side(joinery, plates)
+    write_3mf(
+        folder / f"{name}.3mf",
+        spread,
+        title=f"{name}, all plates",
+        metadata=metadata,
+        colours=colours,
+        layout="apart",
+        keep_place=True,
+    )
+    write_3mf(
+        folder / f"{name}-bambu.3mf",
+        spread,
+        title=name,
+        metadata={**metadata, "Application": _BAMBU},
+        colours=colours,
+        layout="apart",
+        keep_place=True,
+        settings=lambda ids: {
+            "model_settings.config": _bambu_plates(ids, joinery, plates),
+            "project_settings.config": _bambu_project(plates),
+        },
+    )
+    write_json(folder / "assembly.json", assembly_data(tree, joinery, kit))
+
+
+def remove_plates(folder: Path, name: str, keep: int = 0) -> None:
+    """Remove files of plates that an earlier kit in the folder had and this one has not.
+
+    Parameters
+    ----------
+    folder : Path
+        Kit folder.
+    name : str
+        Stem of the files' names.
+    keep : int
+        Number of plates that there are now; 0 where the kit is printed in place.
+    """
+    for path in folder.glob("plate-*.3mf"):
+        number = path.stem.removeprefix("plate-")
+        if number.isdigit() and int(number) > keep:
+            path.unlink()
+    if keep == 0:
+        for file in (f"{name}-bambu.3mf", "assembly.json"):
+            (folder / file).unlink(missing_ok=True)
+
+
+def _corner(plates: Plates, index: int) -> NDArray[np.float64]:
+    """Where a plate begins when all lie side by side, mm: as Bambu Studio places them."""
+    across = math.ceil(math.sqrt(plates.count))
+    row, column = divmod(index, across)
+    return np.array([column * _STRIDE * plates.bed_mm[0], -row * _STRIDE * plates.bed_mm[1], 0.0])
+
+
+def _side_by_side(joinery: Joinery, plates: Plates) -> Joinery:
+    bodies = []
+    for index, (mesh, pose) in enumerate(zip(joinery.bodies, plates.poses, strict=True)):
+        moved = mesh.vertices @ pose[:3, :3].T + pose[:3, 3]
+        moved += _corner(plates, int(plates.plate[index]))
+        bodies.append(replace(mesh, vertices=moved))
+    return replace(joinery, bodies=tuple(bodies), pins=())
+
+
+def _bambu_plates(ids: list[int], joinery: Joinery, plates: Plates) -> str:
+    """The file by which Bambu Studio and OrcaSlicer name the bodies and put them on plates."""
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<config>"]
+    for number, body in zip(ids, joinery.bodies, strict=True):
+        lines += [
+            f'  <object id="{number}">',
+            f'    <metadata key="name" value={quoteattr(body.name)}/>',
+            '    <metadata key="extruder" value="1"/>',
+            f'    <part id="{number}" subtype="normal_part">',
+            f'      <metadata key="name" value={quoteattr(body.name)}/>',
+            '      <metadata key="matrix" value="1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"/>',
+            "    </part>",
+            "  </object>",
+        ]
+    for index in range(plates.count):
+        lines += [
+            "  <plate>",
+            f'    <metadata key="plater_id" value="{index + 1}"/>',
+            f'    <metadata key="plater_name" value="plate {index + 1}"/>',
+            '    <metadata key="locked" value="false"/>',
+        ]
+        for member in np.flatnonzero(plates.plate == index):
+            lines += [
+                "    <model_instance>",
+                f'      <metadata key="object_id" value="{ids[member]}"/>',
+                '      <metadata key="instance_id" value="0"/>',
+                "    </model_instance>",
+            ]
+        lines.append("  </plate>")
+    return "\n".join([*lines, "</config>", ""])
+
+
+def _bambu_project(plates: Plates) -> str:
+    wide, deep, high = plates.bed_mm
+    corners = [f"{x:g}x{y:g}" for x, y in ((0, 0), (wide, 0), (wide, deep), (0, deep))]
+    settings = {
+        "filament_colour": ["#F2754E"],
+        "printable_area": corners,
+        "printable_height": f"{high:g}",
+    }
+    return json.dumps(settings, indent=1) + "\n"
+
+
+def assembly_data(tree: FoldTree, joinery: Joinery, kit: ApartKit) -> dict[str, Any]:
+    """The order of assembly with names (JSON-ready).
+
+    Parameters
+    ----------
+    tree : FoldTree
+        The bodies and their hinges.
+    joinery : Joinery
+        The bodies with their pins.
+    kit : ApartKit
+        Order and plates.
+
+    Returns
+    -------
+    dict
+        What ``assembly.json`` holds.
+    """
+    names = [body.name for body in joinery.bodies]
+    steps = []
+    for step in kit.steps:
+        pin = joinery.pins[step.pin]
+        there = {h.name for h in tree.hinges}
+        inside = set(step.sides[0]) | set(step.sides[1])
+        steps.append(
+            {
+                "hinges": [tree.hinges[h].name for h in pin.hinges],
+                "angles_deg": {
+                    hinge.name: angle
+                    for hinge, angle in zip(tree.hinges, step.angles_deg, strict=True)
+                    if hinge.name in there and hinge.parent in inside and hinge.child in inside
+                },
+                "rests": [names[body] for body in step.sides[0]],
+                "comes": [names[body] for body in step.sides[1]],
+                "comes_along": [-value + 0.0 for value in step.away],
+                "pin": {
+                    "diameter_mm": pin.diameter_mm,
+                    "length_mm": round(pin.length_mm, 2),
+                    "tip_mm": list(pin.tip_mm),
+                    "tail_mm": list(pin.tail_mm),
+                    "gripped_by": names[pin.owner],
+                },
+            }
+        )
+    return {
+        "format": "fabfold-assembly",
+        "version": 1,
+        "steps": steps,
+        "supported": [names[entry.body] for entry in kit.plates.laid if entry.supported],
+        "plates": [
+            [names[body] for body in np.flatnonzero(kit.plates.plate == index)]
+            for index in range(kit.plates.count)
+        ],
+    }
+
+
+def bill_rows(joinery: Joinery, material: str, pin: str) -> list[tuple[str, int, str, str]]:
+    """What a kit is made of and what it takes to put it together.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The bodies with their pins.
+    material : str
+        What is printed.
+    pin : str
+        Name of the loose pin, of :data:`fabfold.printing.print_mode.PINS`.
+
+    Returns
+    -------
+    list of (str, int, str, str)
+        Item, count, size, and what it is for.
+    """
+    volume = sum(body.volume for body in joinery.bodies) / 1000.0
+    rows = [
+        (f"{material or 'material'}, printed", len(joinery.bodies), f"{volume:.1f} cm³ in all",
+         "bodies; with infill it takes less"),
+    ]  # fmt: skip
+    if not joinery.pins:
+        return rows
+    what = PINS[pin][1]
+    lengths = Counter(round(p.length_mm, 1) for p in joinery.pins)
+    for length, count in sorted(lengths.items()):
+        rows.append((f"pin, {what}", count, f"{length:g} mm long", "one a hinge"))
+    bore = max(p.diameter_mm for p in joinery.pins)
+    rows += [
+        (f"drill or reamer of {bore + 0.2:.2f} mm", 1, "", "for bores that came out too tight"),
+        ("needle or wire of at most 1 mm", 1, "", "pushes a pin out again"),
+        (f"rod of {bore:g} mm", 1, "80 mm long", "pushes pins home"),
+    ]
+    return rows
+
+
+def write_bill(folder: Path, joinery: Joinery, material: str, pin: str) -> None:
+    """Write ``bom.csv``; parameters as of :func:`bill_rows`."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["item", "count", "size", "what for"])
+    writer.writerows(bill_rows(joinery, material, pin))
+    write_text(folder / "bom.csv", text.getvalue())

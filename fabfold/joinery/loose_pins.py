@@ -1,0 +1,323 @@
+"""Pins that are pushed in after printing: where they go, and what each end of their bore gets.
+
+A body printed by itself has open bores. At the end where the pin goes in, the two bodies that it
+joins are cleared along the axis; at the other end a thin web with a hole closes the bore, so that
+the pin stops there and a needle pushes it out again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.errors import GeometryError
+from fabfold.joinery.bodies import BodyMesh, Joinery, PlacedPin
+from fabfold.joinery.booleans import subtract, union
+from fabfold.joinery.cells import as_manifold
+from fabfold.joinery.soundness import printable_body
+from fabfold.tree.fold_tree import FoldTree, Hinge
+
+if TYPE_CHECKING:
+    import manifold3d
+
+__all__ = [
+    "CHANNEL_MM",
+    "PUSHER_MM",
+    "PinBore",
+    "barrel_around",
+    "body_solids",
+    "entry_channel",
+    "meshes_with_pins",
+    "pin_bores",
+    "pin_rod",
+    "with_pins",
+]
+
+Floats = NDArray[np.float64]
+
+#: A rod that pushes the pin in reaches this far beyond the barrel, mm.
+PUSHER_MM = 60.0
+#: The channel for the pin is this much wider than its loosest bore, in radius, mm.
+CHANNEL_MM = 0.025
+#: Web that closes the far end of a bore, and the diameter of the hole through it, mm.
+WEB_MM = 0.8
+PUSH_OUT_MM = 1.0
+#: The pin ends this far inside the barrel, so that nothing sticks out, mm.
+_SHORT_MM = 0.2
+#: The web reaches this far into the wall around the bore, mm.
+_BITE_MM = 0.2
+_CORNERS = 24
+
+
+@dataclass(frozen=True)
+class PinBore:
+    """The knuckles that one loose pin goes through, in shape A.
+
+    Attributes
+    ----------
+    hinges : tuple of int
+        Indices of its hinges: one, or both of a double hinge on one edge.
+    bodies : tuple of int
+        Indices of the bodies that have knuckles here.
+    owner : int
+        Index of the body that grips the pin; the outer knuckles are its.
+    middle : (3,) float64 array
+        Middle of the barrel, mm.
+    axis : (3,) float64 array
+        Unit vector along the axis.
+    half_mm : float
+        Half of the length of the barrel, mm.
+    """
+
+    hinges: tuple[int, ...]
+    bodies: tuple[int, ...]
+    owner: int
+    middle: Floats
+    axis: Floats
+    half_mm: float
+
+    def face(self, end: int) -> Floats:
+        """Middle of the barrel's end face, mm; `end` is 1 where `axis` points to, else -1."""
+        return np.asarray(self.middle + end * self.half_mm * self.axis)
+
+
+def pin_bores(tree: FoldTree, joinery: Joinery) -> list[PinBore]:
+    """Every line of knuckles of a kit, in the order of their first hinges.
+
+    Parameters
+    ----------
+    tree : FoldTree
+        The bodies and their hinges.
+    joinery : Joinery
+        The printed bodies; it tells the sizes.
+
+    Returns
+    -------
+    list of PinBore
+        One for each pin.
+    """
+    reach = joinery.barrel_radius_mm + joinery.clearance_mm
+    origin = np.asarray(joinery.origin_mm)
+    found = []
+    for edge in tree.edges:
+        if not edge.hinges:
+            continue
+        hinges = [tree.hinges[h] for h in edge.hinges]
+        groups = [tuple(edge.hinges)] if _one_line(hinges) else [(h,) for h in edge.hinges]
+        for place, group in enumerate(groups):
+            first, last = tree.hinges[group[0]], tree.hinges[group[-1]]
+            bodies: tuple[int, ...]
+            if len(group) == 2:
+                bodies, owner = (first.parent, first.child, last.child), first.child
+            else:
+                # The second axis of a double hinge is laid out from the child's side.
+                bodies = (first.parent, first.child)
+                owner = first.child if place == 1 else first.parent
+            axis = np.asarray(first.direction, dtype=float)
+            found.append(
+                PinBore(
+                    group,
+                    bodies,
+                    owner,
+                    origin + joinery.voxel_mm * np.asarray(first.point, dtype=float),
+                    axis / np.linalg.norm(axis),
+                    joinery.voxel_mm / 2 - reach,
+                )
+            )
+    return sorted(found, key=lambda bore: bore.hinges[0])
+
+
+def _one_line(hinges: Sequence[Hinge]) -> bool:
+    """Whether both axes of a double hinge lie on one edge."""
+    points = np.array([hinge.point for hinge in hinges], dtype=float)
+    return bool(np.ptp(points, axis=0).max() < 1e-6)
+
+
+def _cylinder(start: Floats, end: Floats, radius: float, *, outside: bool) -> manifold3d.Manifold:
+    """A cylinder between two points; its facets lie outside the true one, or inside."""
+    import manifold3d
+
+    along = end - start
+    length = float(np.linalg.norm(along))
+    z = along / length
+    x = np.eye(3)[int(np.abs(z).argmin())]
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    if outside:
+        radius /= np.cos(np.pi / _CORNERS)
+    rod = manifold3d.Manifold.cylinder(length, radius, radius, _CORNERS)
+    return rod.transform(np.column_stack([x, np.cross(z, x), z, start]))
+
+
+def entry_channel(bore: PinBore, end: int, joinery: Joinery, slip_mm: float) -> manifold3d.Manifold:
+    """What the two bodies of a pin give up beyond its barrel so that it can go in.
+
+    Parameters
+    ----------
+    bore : PinBore
+        The knuckles.
+    end : int
+        1 or -1: the end at which the pin goes in.
+    joinery : Joinery
+        It tells the pin's radius.
+    slip_mm : float
+        How much wider than the pin the loosest bore is, in radius, mm.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In mm, shape A.
+    """
+    face = bore.face(end)
+    radius = joinery.pin_radius_mm + slip_mm + CHANNEL_MM
+    return _cylinder(face, face + end * PUSHER_MM * bore.axis, radius, outside=True)
+
+
+def barrel_around(bore: PinBore, joinery: Joinery) -> manifold3d.Manifold:
+    """The barrel of a pin, all of its knuckles, with the wall that its bores want.
+
+    Parameters
+    ----------
+    bore : PinBore
+        The knuckles.
+    joinery : Joinery
+        It tells the barrel's radius.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In mm, shape A.
+    """
+    return _cylinder(bore.face(-1), bore.face(1), joinery.barrel_radius_mm, outside=True)
+
+
+def pin_rod(
+    bore: PinBore, end: int, radius_mm: float, *, from_web: bool = False
+) -> manifold3d.Manifold:
+    """All the space that a pin and its pusher go through on the way in, in shape A.
+
+    Parameters
+    ----------
+    bore : PinBore
+        The knuckles.
+    end : int
+        1 or -1: the end at which the pin goes in.
+    radius_mm : float
+        Radius of the rod, mm.
+    from_web : bool
+        Whether it begins at the web at the other end, or where the barrel ends.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In mm.
+    """
+    face = bore.face(end)
+    start = bore.face(-end) + end * WEB_MM * bore.axis if from_web else face
+    return _cylinder(start, face + end * PUSHER_MM * bore.axis, radius_mm, outside=True)
+
+
+def body_solids(joinery: Joinery) -> list[manifold3d.Manifold]:
+    """The bodies as solids, mm, shape A."""
+    return [as_manifold(body.vertices, body.faces, body.name) for body in joinery.bodies]
+
+
+def with_pins(
+    joinery: Joinery, bores: Sequence[PinBore], ends: Sequence[int], grip_mm: float, slip_mm: float
+) -> Joinery:
+    """Clear each pin's way in, close its other end, and put the pins where they go.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        Bodies with open bores.
+    bores : sequence of PinBore
+        Where the pins go.
+    ends : sequence of int
+        For each, the end at which it goes in: 1 or -1.
+    grip_mm, slip_mm : float
+        How much wider than the pin the bores are, in radius, mm: of the body that grips it, and of
+        the others.
+
+    Returns
+    -------
+    Joinery
+        The bodies as they are printed, with their pins.
+
+    Raises
+    ------
+    GeometryError
+        If a channel cuts a body apart.
+    """
+    cuts: dict[int, list[manifold3d.Manifold]] = {}
+    webs: dict[int, list[manifold3d.Manifold]] = {}
+    pins = []
+    for bore, end in zip(bores, ends, strict=True):
+        channel = entry_channel(bore, end, joinery, slip_mm)
+        for body in bore.bodies:
+            cuts.setdefault(body, []).append(channel)
+        inner = -end * bore.axis
+        outside, inside = bore.face(-end), bore.face(-end) - WEB_MM * inner
+        plug = _cylinder(inside, outside, joinery.pin_radius_mm + grip_mm + _BITE_MM, outside=False)
+        hole = _cylinder(inside - inner, outside + inner, PUSH_OUT_MM / 2, outside=True)
+        webs.setdefault(bore.owner, []).append(plug - hole)
+        tip, tail = inside, bore.face(end) - end * _SHORT_MM * bore.axis
+        pins.append(
+            PlacedPin(
+                bore.hinges,
+                bore.owner,
+                _triple(tip),
+                _triple(tail),
+                2 * joinery.pin_radius_mm,
+            )
+        )
+    bodies = []
+    for index, mesh in enumerate(joinery.bodies):
+        if index not in cuts:
+            bodies.append(mesh)
+            continue
+        solid = subtract(as_manifold(mesh.vertices, mesh.faces, mesh.name), cuts[index])
+        solid = union([solid, *webs.get(index, [])])
+        parts = [part for part in solid.decompose() if part.volume() > 1.0]
+        if len(parts) != 1:
+            raise GeometryError(f"{mesh.name}: the way of a pin cuts it into {len(parts)} pieces")
+        bodies.append(BodyMesh(mesh.name, *printable_body(parts[0], mesh.name, np.zeros(3))))
+    return replace(joinery, bodies=tuple(bodies), pins=tuple(pins))
+
+
+def _triple(point: Floats) -> tuple[float, float, float]:
+    x, y, z = (round(float(value), 6) for value in point)
+    return x, y, z
+
+
+def meshes_with_pins(joinery: Joinery) -> list[tuple[Floats, NDArray[np.int32]]]:
+    """The bodies with the pins that they grip, as they move.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The printed bodies and their pins.
+
+    Returns
+    -------
+    list of ((v, 3) float64 array, (f, 3) int32 array)
+        Vertices in mm, shape A, and triangles of each body; a pin is a piece of its own.
+    """
+    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
+    for pin in joinery.pins:
+        solid = _cylinder(
+            np.array(pin.tip_mm), np.array(pin.tail_mm), pin.diameter_mm / 2, outside=True
+        )
+        made = solid.to_mesh64()
+        vertices, faces = meshes[pin.owner]
+        points = np.asarray(made.vert_properties, dtype=np.float64)[:, :3]
+        corners = np.asarray(made.tri_verts, dtype=np.int32) + np.int32(len(vertices))
+        meshes[pin.owner] = (
+            np.concatenate([vertices, points]),
+            np.concatenate([faces, corners]).astype(np.int32),
+        )
+    return meshes

@@ -1,0 +1,106 @@
+"""How a kit is printed: in place as one object, or body by body with pins that are pushed in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from fabfold.errors import RecipeError
+from fabfold.printing.profiles import Profile
+
+if TYPE_CHECKING:
+    from hinges.hardware import LoosePin
+
+__all__ = ["PINS", "PrintMode", "print_mode"]
+
+#: Pins that a kit can be joined with: name, diameter in mm, and what one buys.
+PINS: Final[dict[str, tuple[float, str]]] = {
+    "1.75": (1.75, "filament of 1.75 mm"),
+    "2.85": (2.85, "filament of 2.85 mm"),
+    "rod-2": (2.0, "round rod of 2 mm"),
+}
+
+
+@dataclass(frozen=True)
+class PrintMode:
+    """How a kit is printed, and the gaps that this wants.
+
+    Attributes
+    ----------
+    apart : bool
+        Whether the bodies are printed one by one.
+    why : str
+        Who chose it.
+    profile : Profile
+        Printer and material, with the clearance and the smallest gap of this way.
+    pin : str
+        Name of the loose pin, of :data:`PINS`.
+    """
+
+    apart: bool
+    why: str
+    profile: Profile
+    pin: str
+
+    @property
+    def name(self) -> str:
+        """``"apart"`` or ``"in-place"``."""
+        return "apart" if self.apart else "in-place"
+
+    @property
+    def face_gap_mm(self) -> float | None:
+        """Gap between the faces of two bodies in mm; None where it is the clearance."""
+        return self.profile.apart.face_gap_mm if self.apart else None
+
+    def loose_pin(self) -> LoosePin | None:
+        """The pin that is pushed in after printing; None where pins are printed."""
+        if not self.apart:
+            return None
+        from hinges.hardware import LoosePin
+
+        fit = self.profile.apart
+        return LoosePin(PINS[self.pin][0], fit.grip_mm, fit.slip_mm, entry="none")
+
+
+def print_mode(
+    profile: Profile, asked: str = "auto", pin: str = "1.75", clearance_mm: float | None = None
+) -> PrintMode:
+    """Choose how a kit is printed.
+
+    Parameters
+    ----------
+    profile : Profile
+        Printer and material.
+    asked : {"auto", "in-place", "apart"}
+        What the recipe asks for; auto leaves it to the profile.
+    pin : str
+        Name of the loose pin, of :data:`PINS`.
+    clearance_mm : float, optional
+        Clearance in the hinges, mm, in place of the profile's.
+
+    Returns
+    -------
+    PrintMode
+        With the gaps of this way.
+
+    Raises
+    ------
+    RecipeError
+        If a clearance is not above the smallest gap that the profile asks for.
+    """
+    apart = asked == "apart" or (asked == "auto" and not profile.in_place)
+    if asked != "auto":
+        why = f"asked for with --print {asked}"
+    elif apart:
+        why = f"{profile.name} does not hold open the gaps of a kit that is printed closed"
+    else:
+        why = f"{profile.name} holds open the gaps of a kit that is printed closed"
+    gaps = profile.apart if apart else profile
+    clearance = gaps.clearance_mm if clearance_mm is None else clearance_mm
+    if clearance <= gaps.min_gap_mm:
+        raise RecipeError(
+            f"--clearance-mm {clearance:g}: {profile.name} asks for gaps of {gaps.min_gap_mm:g} mm "
+            f"at least; give more than that (its own clearance is {gaps.clearance_mm:g} mm)"
+        )
+    gapped = profile.model_copy(update={"clearance_mm": clearance, "min_gap_mm": gaps.min_gap_mm})
+    return PrintMode(apart, why, gapped, pin)
