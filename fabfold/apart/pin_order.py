@@ -175,7 +175,7 @@ def find_order(
     GeometryError
         If some pins cannot be pushed in, in no pose and from no end; it names their hinges.
     """
-    search = _Search(tree, motion, joinery, bores, slip_mm)
+    search = _Disassembly(tree, motion, joinery, bores, slip_mm)
     steps: list[AssemblyStep] = []
     todo = [(frozenset(range(len(tree.bodies))), 0)]
     while todo:
@@ -194,7 +194,7 @@ def find_order(
     return steps[::-1]
 
 
-class _Search:
+class _Disassembly:
     """What is known while a kit is taken apart."""
 
     def __init__(
