@@ -1,12 +1,13 @@
 """Slice the 3MF of each kit with PrusaSlicer, headless: python benchmarks/slicing.py KIT [KIT ...].
 
-Prints a line a kit with the slicer's exit code and the size of the G-code, and exits 1 if the
-slicer refused one. The bed is made large enough for the kit; supports are on, since shape A hangs
-over itself.
+Prints a line a file with the slicer's exit code and the size of the G-code, and exits 1 if the
+slicer refused one: ``NAME.3mf`` of a kit that is printed in place, every plate of one that is not. The
+bed is made large enough for the kit; supports are on, since shape A hangs over itself.
 """
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import tempfile
@@ -15,8 +16,15 @@ from pathlib import Path
 
 
 def slice_kit(kit: Path) -> bool:
-    """Slice ``KIT/*.3mf``; whether the slicer took it."""
-    (model,) = kit.glob("*.3mf")
+    """Slice what is to be printed; whether the slicer took everything."""
+    report = json.loads((kit / "report.json").read_text(encoding="utf-8"))
+    if report["summary"]["print"] == "apart":
+        return all([slice_file(path) for path in sorted(kit.glob("plate-*.3mf"))])
+    return slice_file(kit / f"{report['summary']['model']}.3mf")
+
+
+def slice_file(model: Path) -> bool:
+    """Slice one file; whether the slicer took it."""
     with tempfile.TemporaryDirectory() as folder:
         gcode = Path(folder) / "kit.gcode"
         command = [

@@ -361,9 +361,33 @@ def test_printed_in_place_again_the_plates_go(tmp_path):
 
     for name in ("plate-1.3mf", "plate-2.3mf", "bar-bambu.3mf", "assembly.json", "plate-x.3mf"):
         (tmp_path / name).write_text("old", "utf-8")
-    remove_plates(tmp_path, "bar", keep=1)
+    remove_plates(tmp_path, keep=1)
     assert sorted(p.name for p in tmp_path.iterdir()) == [
         "assembly.json", "bar-bambu.3mf", "plate-1.3mf", "plate-x.3mf",
     ]  # fmt: skip
-    remove_plates(tmp_path, "bar")
-    assert [p.name for p in tmp_path.iterdir()] == ["plate-x.3mf"]
+    remove_plates(tmp_path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["bar-bambu.3mf", "plate-x.3mf"]
+
+
+def test_the_urdf_folds_in_mujoco_as_the_kit_does(kit_folder):
+    import mujoco
+
+    kit, folder = kit_folder
+    built = kit.join()
+    tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
+    model = mujoco.MjModel.from_xml_path(str(folder / "bar.urdf"))
+    data = mujoco.MjData(model)
+    assert model.njnt == len(tree.hinges)
+    for hinge, angle in zip(tree.hinges, motion.angles_deg[-1], strict=True):
+        joint = model.joint(hinge.name)
+        assert joint.range[0] - 1e-6 <= np.radians(angle) <= joint.range[1] + 1e-6
+        data.joint(hinge.name).qpos = np.radians(angle)
+    mujoco.mj_forward(model, data)
+    wanted = poses_in_mm(tree, joinery, motion.angles_deg[-1])
+    origin = np.array(joinery.origin_mm)
+    for hinge in tree.hinges:
+        name, pose = joinery.bodies[hinge.child].name, wanted[hinge.child]
+        point = origin + 20.0 * np.array(hinge.point)
+        assert np.allclose(data.body(name).xmat.reshape(3, 3), pose[:3, :3], atol=1e-6)
+        there = 1000.0 * data.body(name).xpos
+        assert np.allclose(there, pose[:3, :3] @ point + pose[:3, 3], atol=1e-3)

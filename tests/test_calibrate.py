@@ -50,3 +50,12 @@ def test_the_commands_write_coupon_and_profile(tmp_path, monkeypatch):
     assert done.exit_code == 2
     done = run(app, ["coupon", "--clearances", "0.2,x", "-o", "coupon.stl"])
     assert done.exit_code == 2
+
+
+def test_a_profile_for_bodies_apart_comes_back_with_the_clearance_that_was_read(tmp_path):
+    mine = calibrate(load_profile("fdm-pla-0.4"), 0.25, fuses_mm=0.15)
+    write_profile(tmp_path / "mine.toml", mine)
+    again = load_profile(str(tmp_path / "mine.toml"))
+    assert again == mine
+    assert again.apart.clearance_mm == 0.25
+    assert (again.apart.face_gap_mm, again.apart.grip_mm, again.apart.slip_mm) == (0.2, 0.1, 0.2)

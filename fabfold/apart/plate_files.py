@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.apart.apart_kit import ApartKit
 from fabfold.apart.plates import Plates, on_plate
+from fabfold.export.bambu import BAMBU, bambu_plates, bambu_project
 from fabfold.export.threemf import write_3mf
 from fabfold.files import write_json, write_text
 from fabfold.joinery.bodies import Joinery
@@ -28,8 +27,6 @@ __all__ = ["assembly_data", "bill_rows", "remove_plates", "write_bill", "write_p
 
 #: Between two plates Bambu Studio leaves a fifth of a plate.
 _STRIDE = 1.2
-#: The release of Bambu Studio whose form of plates is written.
-_BAMBU = "BambuStudio-01.09.00.00"
 
 
 def write_plates(
@@ -61,7 +58,7 @@ def write_plates(
         Facts about the files.
     """
     plates = kit.plates
-    remove_plates(folder, name, keep=plates.count)
+    remove_plates(folder, keep=plates.count)
     for index in range(plates.count):
         on = plates.plate == index
         write_3mf(
@@ -74,6 +71,7 @@ def write_plates(
             keep_place=True,
         )
     spread = _side_by_side(joinery, plates)
+    names = [body.name for body in joinery.bodies]
     write_3mf(
         folder / f"{name}.3mf",
         spread,
@@ -87,27 +85,27 @@ def write_plates(
         folder / f"{name}-bambu.3mf",
         spread,
         title=name,
-        metadata={**metadata, "Application": _BAMBU},
+        metadata={**metadata, "Application": BAMBU},
         colours=colours,
         layout="apart",
         keep_place=True,
         settings=lambda ids: {
-            "model_settings.config": _bambu_plates(ids, joinery, plates),
-            "project_settings.config": _bambu_project(plates),
+            "model_settings.config": bambu_plates(
+                list(zip(ids, names, strict=True)), plates.plate, plates.count
+            ),
+            "project_settings.config": bambu_project(plates.bed_mm),
         },
     )
     write_json(folder / "assembly.json", assembly_data(tree, joinery, kit))
 
 
-def remove_plates(folder: Path, name: str, keep: int = 0) -> None:
+def remove_plates(folder: Path, keep: int = 0) -> None:
     """Remove files of plates that an earlier kit in the folder had and this one has not.
 
     Parameters
     ----------
     folder : Path
         Kit folder.
-    name : str
-        Stem of the files' names.
     keep : int
         Number of plates that there are now; 0 where the kit is printed in place.
     """
@@ -116,8 +114,7 @@ def remove_plates(folder: Path, name: str, keep: int = 0) -> None:
         if number.isdigit() and int(number) > keep:
             path.unlink()
     if keep == 0:
-        for file in (f"{name}-bambu.3mf", "assembly.json"):
-            (folder / file).unlink(missing_ok=True)
+        (folder / "assembly.json").unlink(missing_ok=True)
 
 
 def _corner(plates: Plates, index: int) -> NDArray[np.float64]:
@@ -134,49 +131,6 @@ def _side_by_side(joinery: Joinery, plates: Plates) -> Joinery:
         moved += _corner(plates, int(plates.plate[index]))
         bodies.append(replace(mesh, vertices=moved))
     return replace(joinery, bodies=tuple(bodies), pins=())
-
-
-def _bambu_plates(ids: list[int], joinery: Joinery, plates: Plates) -> str:
-    """The file by which Bambu Studio and OrcaSlicer name the bodies and put them on plates."""
-    lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<config>"]
-    for number, body in zip(ids, joinery.bodies, strict=True):
-        lines += [
-            f'  <object id="{number}">',
-            f'    <metadata key="name" value={quoteattr(body.name)}/>',
-            '    <metadata key="extruder" value="1"/>',
-            f'    <part id="{number}" subtype="normal_part">',
-            f'      <metadata key="name" value={quoteattr(body.name)}/>',
-            '      <metadata key="matrix" value="1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"/>',
-            "    </part>",
-            "  </object>",
-        ]
-    for index in range(plates.count):
-        lines += [
-            "  <plate>",
-            f'    <metadata key="plater_id" value="{index + 1}"/>',
-            f'    <metadata key="plater_name" value="plate {index + 1}"/>',
-            '    <metadata key="locked" value="false"/>',
-        ]
-        for member in np.flatnonzero(plates.plate == index):
-            lines += [
-                "    <model_instance>",
-                f'      <metadata key="object_id" value="{ids[member]}"/>',
-                '      <metadata key="instance_id" value="0"/>',
-                "    </model_instance>",
-            ]
-        lines.append("  </plate>")
-    return "\n".join([*lines, "</config>", ""])
-
-
-def _bambu_project(plates: Plates) -> str:
-    wide, deep, high = plates.bed_mm
-    corners = [f"{x:g}x{y:g}" for x, y in ((0, 0), (wide, 0), (wide, deep), (0, deep))]
-    settings = {
-        "filament_colour": ["#F2754E"],
-        "printable_area": corners,
-        "printable_height": f"{high:g}",
-    }
-    return json.dumps(settings, indent=1) + "\n"
 
 
 def assembly_data(tree: FoldTree, joinery: Joinery, kit: ApartKit) -> dict[str, Any]:

@@ -233,7 +233,7 @@ def lay_out_plates(joinery: Joinery, bores: Sequence[PinBore], profile: Profile)
     CheckError
         If a body fits no plate; it names the voxel size that does.
     """
-    from rectpack import MaxRectsBssf, PackingMode, newPacker
+    from rectpack import MaxRectsBl, PackingMode, newPacker
 
     bed = profile.bed_mm or (220.0, 220.0, 250.0)
     laid = [
@@ -243,7 +243,7 @@ def lay_out_plates(joinery: Joinery, bores: Sequence[PinBore], profile: Profile)
     free = np.array([bed[0] - 2 * _RIM_MM, bed[1] - 2 * _RIM_MM, bed[2]])
     for entry in laid:
         _require_fit(joinery, entry, free, bed)
-    packer = newPacker(mode=PackingMode.Offline, pack_algo=MaxRectsBssf, rotation=True)
+    packer = newPacker(mode=PackingMode.Offline, pack_algo=MaxRectsBl, rotation=True)
     for entry in laid:
         packer.add_rect(*(_tenths(size + _ROOM_MM) for size in entry.size_mm[:2]), entry.body)
     packer.add_bin(*(_tenths(size + _ROOM_MM) for size in free[:2]), float("inf"))

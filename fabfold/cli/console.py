@@ -225,14 +225,15 @@ def show_list(what: str) -> None:
         for name in template_names():
             table.add_row(name, str(len(load_template(name))), describe(name))
     elif what == "profiles":
+        from fabfold.printing.print_mode import print_mode
         from fabfold.printing.profiles import load_profile, profile_names
 
-        table = Table("profile", "process", "clearance", "what it is", box=None)
+        table = Table("profile", "process", "printed", "clearance", "what it is", box=None)
         for name in profile_names():
             profile = load_profile(name)
-            table.add_row(
-                name, profile.process, f"{profile.clearance_mm:g} mm", profile.description
-            )
+            mode = print_mode(profile)
+            clearance = f"{mode.profile.clearance_mm:g} mm"
+            table.add_row(name, profile.process, mode.name, clearance, profile.description)
     else:
         raise RecipeError(f"cannot list {what!r}: there are samples, templates and profiles")
     console.print(table)

@@ -12,8 +12,9 @@ three, called layouts:
 ``"assembly"``
     One mesh object a body and one build item that holds them all as components, in their places.
     This is how the 3MF core specification groups parts; Bambu Studio and OrcaSlicer open it as one
-    object of named parts. PrusaSlicer does not: it takes the components apart into separate
-    objects, and refuses those that do not touch the plate.
+    object of named parts, each in its own colour where ``Application`` says
+    :data:`fabfold.export.bambu.BAMBU`. PrusaSlicer does not: it takes the components apart into
+    separate objects, and refuses those that do not touch the plate.
 ``"apart"``
     One mesh object and one build item a body: for bodies laid out on a plate.
 
@@ -37,6 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
+from fabfold.export.bambu import bambu_model, bambu_project
 from fabfold.export.colours import palette
 from fabfold.export.weld import printable_mesh
 from fabfold.files import replacing
@@ -65,6 +67,8 @@ _KNOWN = frozenset(
 _DECIMALS = 6
 _NAMESPACE = "urn:fabfold:kit"
 _RELATIONSHIP = "urn:fabfold:slicer-settings"
+#: Bed that a file for Bambu Studio names where none is known, mm.
+_BAMBU_BED_MM = (256.0, 256.0, 256.0)
 _UNIT_MATRIX = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
 _Mesh = tuple[NDArray[np.float32], NDArray[np.int32]]
 
@@ -176,7 +180,11 @@ def write_3mf(
         built = [whole]
     elif layout == "assembly":
         whole = _add_assembly(wrapper, model, title, names, bodies, space)
-        attached = {"model_settings.config": _bambu_config(whole, title, names, bodies)}
+        parts = [(b.GetModelResourceID(), name) for b, name in zip(bodies, names, strict=True)]
+        attached = {
+            "model_settings.config": bambu_model(whole.GetModelResourceID(), title, parts),
+            "project_settings.config": bambu_project(_BAMBU_BED_MM, np.asarray(colours)),
+        }
         built = [whole]
     if layout != "apart":
         built[0].SetUUID(str(uuid.uuid5(space, "kit")))
@@ -300,21 +308,3 @@ def _prusa_config(whole: Any, title: str, names: list[str], meshes: list[_Mesh])
         ]
         start += len(faces)
     return "\n".join([*lines, " </object>", "</config>", ""])
-
-
-def _bambu_config(whole: Any, title: str, names: list[str], bodies: list[Any]) -> str:
-    """The file by which Bambu Studio and OrcaSlicer see the bodies as named parts."""
-    lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        "<config>",
-        f'  <object id="{whole.GetModelResourceID()}">',
-        f'    <metadata key="name" value={quoteattr(title)}/>',
-    ]
-    for name, body in zip(names, bodies, strict=True):
-        lines += [
-            f'    <part id="{body.GetModelResourceID()}" subtype="normal_part">',
-            f'      <metadata key="name" value={quoteattr(name)}/>',
-            f'      <metadata key="matrix" value="{_UNIT_MATRIX}"/>',
-            "    </part>",
-        ]
-    return "\n".join([*lines, "  </object>", "</config>", ""])

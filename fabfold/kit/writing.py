@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fabfold.export.bambu import BAMBU
 from fabfold.export.colours import body_colours
 from fabfold.export.flat import flat_poses
 from fabfold.export.glb import write_glb
@@ -15,6 +16,7 @@ from fabfold.export.report import write_report
 from fabfold.export.sketch import picture_of_tree
 from fabfold.export.stl import write_stl
 from fabfold.export.threemf import posed, write_3mf
+from fabfold.export.urdf import write_urdf
 from fabfold.files import write_bytes, write_json, write_text
 from fabfold.kit.box_closure import BoxClosure
 from fabfold.kit.stages import BuiltTree, PlannedTree
@@ -178,7 +180,7 @@ def write_built(folder: Path, built: BuiltTree) -> None:
 
 
 def write_printable(folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltTree) -> None:
-    """Write the tree, its certified motion, the bodies as STL and 3MF, and what to buy.
+    """Write the tree, its certified motion, the bodies as STL, 3MF and URDF, and what to buy.
 
     Parameters
     ----------
@@ -207,9 +209,18 @@ def write_printable(folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltT
     if built.apart is not None:
         write_plates(folder, name, tree, joinery, built.apart, colours, metadata)
     else:
-        remove_plates(folder, name)
+        remove_plates(folder)
         title = f"{name} folds into {tree.template.name}"
         write_3mf(folder / f"{name}.3mf", joinery, title=title, metadata=metadata, colours=colours)
+        write_3mf(
+            folder / f"{name}-bambu.3mf",
+            joinery,
+            title=title,
+            metadata={**metadata, "Application": BAMBU},
+            colours=colours,
+            layout="assembly",
+        )
+    write_urdf(folder / f"{name}.urdf", joinery, tree, built.planned.motion, name)
     write_bill(folder, joinery, mode.profile.material, mode.pin)
 
 

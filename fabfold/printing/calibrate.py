@@ -53,6 +53,12 @@ def calibrate(
     gap = profile.min_gap_mm / profile.clearance_mm * turns_freely_mm
     if fuses_mm is not None:
         gap = (fuses_mm + turns_freely_mm) / 2.0
+    apart = profile.apart.model_copy(
+        update={
+            "clearance_mm": round(turns_freely_mm, 4),
+            "min_gap_mm": round(min(profile.apart.min_gap_mm, turns_freely_mm / 2.0), 4),
+        }
+    )
     read = f"clearance: read off a tolerance coupon, {turns_freely_mm:g} mm turns freely"
     if fuses_mm is not None:
         read += f", {fuses_mm:g} mm fuses"
@@ -63,6 +69,7 @@ def calibrate(
             "clearance_mm": round(turns_freely_mm, 4),
             "min_gap_mm": round(gap, 4),
             "sources": (read, *profile.sources),
+            "apart": apart,
         }
     )
 

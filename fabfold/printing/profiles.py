@@ -99,10 +99,10 @@ class Profile(BaseModel):
         every face.
     bed_mm : (float, float, float) or None
         Build volume along x, y and z, mm.
-    apart : ApartFit
-        Gaps where the bodies are printed one by one.
     sources : tuple of str
         Where the figures come from.
+    apart : ApartFit
+        Gaps where the bodies are printed one by one.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -119,8 +119,8 @@ class Profile(BaseModel):
     max_overhang_deg: Annotated[float, Field(ge=0.0, le=90.0)] | None = None
     in_place: bool
     bed_mm: tuple[Length, Length, Length] | None = None
-    apart: ApartFit = ApartFit()
     sources: tuple[str, ...] = ()
+    apart: ApartFit = ApartFit()
 
     @model_validator(mode="after")
     def _gap_below_clearance(self) -> Profile:

@@ -1,0 +1,130 @@
+"""The settings by which Bambu Studio and OrcaSlicer see named, coloured parts and plates in a 3MF.
+
+Both read ``Metadata/model_settings.config`` whoever wrote the file: one entry an object, with its
+parts. Plates and colours count only where the file's ``Application`` is Bambu Studio and
+``Metadata/project_settings.config`` is not empty. Few fields are written, all of them such as
+Bambu's own files have.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["BAMBU", "bambu_model", "bambu_plates", "bambu_project"]
+
+#: What ``Application`` says: the release whose form is written.
+BAMBU = "BambuStudio-01.09.00.00"
+_UNIT_MATRIX = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
+_HEAD = ['<?xml version="1.0" encoding="UTF-8"?>', "<config>"]
+
+
+def _part(number: int, name: str, filament: int) -> list[str]:
+    return [
+        f'    <part id="{number}" subtype="normal_part">',
+        f'      <metadata key="name" value={quoteattr(name)}/>',
+        f'      <metadata key="matrix" value="{_UNIT_MATRIX}"/>',
+        f'      <metadata key="extruder" value="{filament}"/>',
+        "    </part>",
+    ]
+
+
+def bambu_model(whole: int, title: str, parts: Sequence[tuple[int, str]]) -> str:
+    """``model_settings.config`` of one object with named parts, each in its own filament.
+
+    Parameters
+    ----------
+    whole : int
+        Number of the object that holds the parts.
+    title : str
+        Its name.
+    parts : sequence of (int, str)
+        Number and name of each part.
+
+    Returns
+    -------
+    str
+        XML.
+    """
+    lines = [
+        *_HEAD,
+        f'  <object id="{whole}">',
+        f'    <metadata key="name" value={quoteattr(title)}/>',
+        '    <metadata key="extruder" value="1"/>',
+    ]
+    for index, (number, name) in enumerate(parts):
+        lines += _part(number, name, index + 1)
+    return "\n".join([*lines, "  </object>", "</config>", ""])
+
+
+def bambu_plates(objects: Sequence[tuple[int, str]], plate: NDArray[np.int_], count: int) -> str:
+    """``model_settings.config`` of objects of one part each, on plates, all in one filament.
+
+    Parameters
+    ----------
+    objects : sequence of (int, str)
+        Number and name of each object.
+    plate : (n,) int array
+        Plate of each, from 0.
+    count : int
+        Number of plates.
+
+    Returns
+    -------
+    str
+        XML.
+    """
+    lines = list(_HEAD)
+    for number, name in objects:
+        lines += [
+            f'  <object id="{number}">',
+            f'    <metadata key="name" value={quoteattr(name)}/>',
+            '    <metadata key="extruder" value="1"/>',
+            *_part(number, name, 1),
+            "  </object>",
+        ]
+    for index in range(count):
+        lines += [
+            "  <plate>",
+            f'    <metadata key="plater_id" value="{index + 1}"/>',
+            f'    <metadata key="plater_name" value="plate {index + 1}"/>',
+            '    <metadata key="locked" value="false"/>',
+        ]
+        for member in np.flatnonzero(plate == index).tolist():
+            lines += [
+                "    <model_instance>",
+                f'      <metadata key="object_id" value="{objects[member][0]}"/>',
+                '      <metadata key="instance_id" value="0"/>',
+                "    </model_instance>",
+            ]
+        lines.append("  </plate>")
+    return "\n".join([*lines, "</config>", ""])
+
+
+def bambu_project(bed_mm: Sequence[float], filaments: NDArray[np.uint8] | None = None) -> str:
+    """``project_settings.config``: the bed, and a colour for each filament.
+
+    Parameters
+    ----------
+    bed_mm : sequence of float
+        Size of the bed, and height above it, mm.
+    filaments : (n, 3) uint8 array, optional
+        sRGB of each filament; one grey one by default.
+
+    Returns
+    -------
+    str
+        JSON.
+    """
+    wide, deep, high = bed_mm
+    colours = [(128, 128, 128)] if filaments is None else filaments.tolist()
+    settings = {
+        "filament_colour": ["#{:02X}{:02X}{:02X}".format(*colour) for colour in colours],
+        "printable_area": ["0x0", f"{wide:g}x0", f"{wide:g}x{deep:g}", f"0x{deep:g}"],
+        "printable_height": f"{high:g}",
+    }
+    return json.dumps(settings, indent=1) + "\n"
