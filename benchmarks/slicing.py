@@ -1,8 +1,8 @@
 """Slice the 3MF of each kit with PrusaSlicer, headless: python benchmarks/slicing.py KIT [KIT ...].
 
 Prints a line a file with the slicer's exit code and the size of the G-code, and exits 1 if the
-slicer refused one: ``NAME.3mf`` of a kit that is printed in place, every plate of one that is not. The
-bed is made large enough for the kit; supports are on, since shape A hangs over itself.
+slicer refused one: ``NAME.3mf`` of a kit that is printed in place, every plate of one that is not.
+The bed is made large enough for the kit; supports are on, since shape A hangs over itself.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ def slice_kit(kit: Path) -> bool:
     """Slice what is to be printed; whether the slicer took everything."""
     report = json.loads((kit / "report.json").read_text(encoding="utf-8"))
     if report["summary"]["print"] == "apart":
-        return all([slice_file(path) for path in sorted(kit.glob("plate-*.3mf"))])
+        verdicts = [slice_file(path) for path in sorted(kit.glob("plate-*.3mf"))]
+        return all(verdicts)
     return slice_file(kit / f"{report['summary']['model']}.3mf")
 
 

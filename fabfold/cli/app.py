@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fabfold.errors import CheckError, FabfoldError
+from fabfold.errors import CheckError, FabfoldError, RecipeError
 from fabfold.version import __version__
 
 if TYPE_CHECKING:
@@ -240,6 +240,10 @@ Time = Annotated[
         show_default=False,
     ),
 ]
+Json = Annotated[
+    bool,
+    typer.Option("--json", help="With 'check': the checks as JSON, and nothing else."),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")]
 
 
@@ -266,8 +270,6 @@ def _guarded(command: Callable[..., None]) -> Callable[..., None]:
 def _triple(text: str | None, option: str) -> tuple[float, float, float] | None:
     if text is None:
         return None
-    from fabfold.errors import RecipeError
-
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
@@ -337,20 +339,29 @@ def _stage(name: str, summary: str) -> None:
         scheduler: Scheduler = None,
         time: Time = None,
         pareto: Pareto = False,
+        as_json: Json = False,
         quiet: Quiet = False,
     ) -> None:
         options = dict(locals())
-        for key in ("name", "summary", "pareto"):
+        for key in ("name", "summary", "pareto", "as_json"):
             options.pop(key, None)
+        if name == "check" and output is None and _is_model_file(source):
+            _check_file(Path(source), profile, as_json=as_json, quiet=quiet)
+            return
+        if as_json and name != "check":
+            raise RecipeError(f"--json goes with 'fabfold check', not with {name!r}")
         options["seconds"] = options.pop("time")
         kit = _kit(**options)
         if pareto:
             _show_pareto(kit, name)
             return
         kit.run(name)
-        from fabfold.cli.console import show_result
+        from fabfold.cli.console import show_checks, show_result
 
-        show_result(kit, name)
+        if as_json:
+            show_checks(kit.check(), {"kit": kit.recipe.name}, as_json=True)
+        else:
+            show_result(kit, name)
         if name in ("check", "export") and not all(check.ok for check in kit.check()):
             raise typer.Exit(CheckError.exit_code)
 
@@ -358,9 +369,29 @@ def _stage(name: str, summary: str) -> None:
     app.command(name, help=summary)(_guarded(command))
 
 
+def _is_model_file(source: str) -> bool:
+    path = Path(source)
+    return path.is_file() and path.suffix != ".toml"
+
+
+def _check_file(path: Path, profile: str | None, *, as_json: bool, quiet: bool) -> None:
+    """Check any file for a printer, without making a kit of it."""
+    from fabfold.cli.console import ConsoleListener, show_checks
+    from fabfold.printing.file_checks import check_file
+    from fabfold.printing.profiles import DEFAULT_PROFILE, load_profile
+    from fabfold.progress import SilentListener
+
+    listener = SilentListener() if quiet or as_json else ConsoleListener()
+    chosen = load_profile(profile or DEFAULT_PROFILE)
+    with listener.stage("check") as progress:
+        checks = check_file(path, chosen, progress)
+    show_checks(checks, {"file": path.name, "profile": chosen.name}, as_json=as_json)
+    if not all(check.ok for check in checks):
+        raise typer.Exit(CheckError.exit_code)
+
+
 def _show_pareto(kit: Kit, stage: str) -> None:
     from fabfold.cli.console import show_pareto
-    from fabfold.errors import RecipeError
 
     if stage != "fit":
         raise RecipeError(f"--pareto goes with 'fabfold fit', not with {stage!r}")
@@ -372,7 +403,11 @@ _stage("voxelize", "Cut the model into voxels.")
 _stage("fit", "Find joint trees that carry the voxels into the template and fold.")
 _stage("fold", "Take the best tree and keep its folding path.")
 _stage("join", "Cut the printed bodies with their hinges, and certify the path on them.")
-_stage("check", "Check the printed bodies and replay the folding.")
+_stage(
+    "check",
+    "Check the printed bodies and replay the folding; or, of a model FILE without --output, "
+    "whether the printer of --profile can make it as it lies, and what moves in it.",
+)
 _stage("export", "Make the whole kit: 3MF, STEP, STL, animation and report.")
 
 

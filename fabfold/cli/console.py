@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -17,8 +19,9 @@ from fabfold.progress import Progress, processor_seconds
 
 if TYPE_CHECKING:
     from fabfold.kit.kit import Kit
+    from fabfold.printing.checks import Check
 
-__all__ = ["ConsoleListener", "show_list", "show_result"]
+__all__ = ["ConsoleListener", "show_checks", "show_list", "show_result"]
 
 _TITLES = {
     "solid": "Reading the model",
@@ -175,6 +178,24 @@ def _result_lines(kit: Kit, stage: str) -> list[str]:
     if kit.folder is not None:
         lines.append(f"kit: {kit.folder}")
     return lines
+
+
+def show_checks(checks: Sequence[Check], about: Mapping[str, str], *, as_json: bool) -> None:
+    """Print checks as a table, or as JSON with what they are about."""
+    if as_json:
+        verdict = "ok" if all(check.ok for check in checks) else "failed"
+        entries = [asdict(check) for check in checks]
+        print(json.dumps({**about, "verdict": verdict, "checks": entries}, ensure_ascii=False))
+        return
+    table = Table("", "check", "figure", "limit", "what it means", box=None)
+    for check in checks:
+        limit = "" if check.limit is None else f"{check.limit:.4g}"
+        mark = "" if check.limit is None else "ok" if check.ok else "FAILED"
+        table.add_row(mark, check.name, f"{check.figure:.4g} {check.unit}", limit, check.note)
+    console = Console(highlight=False)
+    console.print(table)
+    passed = sum(check.ok for check in checks)
+    console.print(f"{', '.join(about.values())}: {passed} of {len(checks)} checks passed")
 
 
 def show_pareto(kit: Kit) -> None:

@@ -51,14 +51,16 @@ def check_bodies(
     """
     progress = progress or SilentProgress()
     progress.update(0.0, "reading the bodies")
-    checks = check_topology(joinery, progress)
+    checks = check_topology(joinery.bodies, progress)
     try:
         solids = [as_manifold(body.vertices, body.faces, body.name) for body in joinery.bodies]
     except GeometryError as error:
         # Nothing below can be measured on a mesh that is no solid.
         return [*checks, Check("bodies are solids", 1.0, 0.0, "bodies", False, str(error))]
     progress.update(0.4, "gaps between bodies")
-    checks += check_gaps(joinery, tree, solids, profile)
+    hinged = {(hinge.parent, hinge.child): hinge.name for hinge in tree.hinges}
+    reach = 2.0 * joinery.clearance_mm
+    checks += check_gaps(joinery.bodies, solids, profile, reach, hinged)
     progress.update(0.6, "walls")
     checks += check_walls(joinery, solids, profile)
     progress.update(0.9, "sizes and overhangs")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from fabfold.joinery.bodies import Joinery
+from fabfold.joinery.bodies import BodyMesh
 from fabfold.printing.checks import Check
 from fabfold.printing.profiles import Profile
-from fabfold.tree.fold_tree import FoldTree
 
 if TYPE_CHECKING:
     import manifold3d
@@ -47,31 +47,36 @@ def smallest_gap(
 
 
 def check_gaps(
-    joinery: Joinery, tree: FoldTree, solids: list[manifold3d.Manifold], profile: Profile
+    bodies: Sequence[BodyMesh],
+    solids: Sequence[manifold3d.Manifold],
+    profile: Profile,
+    reach_mm: float,
+    hinged: Mapping[tuple[int, int], str] | None = None,
 ) -> list[Check]:
     """Check the gaps between all neighbouring bodies in shape A.
 
     Parameters
     ----------
-    joinery : Joinery
+    bodies : sequence of BodyMesh
         The printed bodies.
-    tree : FoldTree
-        The bodies and hinges; it names the hinged pairs.
-    solids : list of manifold3d.Manifold
+    solids : sequence of manifold3d.Manifold
         The bodies as solids, in the same order, mm.
     profile : Profile
         Limits of the printer and material.
+    reach_mm : float
+        Gaps are looked for up to this width, mm.
+    hinged : mapping of (int, int) to str, optional
+        Name of the hinge between two bodies, by their indices.
 
     Returns
     -------
     list of Check
         The smallest gap, and the common volume of bodies.
     """
-    reach = 2.0 * joinery.clearance_mm
-    hinged = {(h.parent, h.child): h.name for h in tree.hinges}
-    names = [body.name for body in joinery.bodies]
-    lows = [body.vertices.min(axis=0) for body in joinery.bodies]
-    highs = [body.vertices.max(axis=0) for body in joinery.bodies]
+    reach, hinged = reach_mm, hinged or {}
+    names = [body.name for body in bodies]
+    lows = [body.vertices.min(axis=0) for body in bodies]
+    highs = [body.vertices.max(axis=0) for body in bodies]
     best, where, pairs, overlap, fused = reach, "", 0, 0.0, []
     for i in range(len(solids)):
         for j in range(i + 1, len(solids)):
@@ -92,7 +97,7 @@ def check_gaps(
     else:
         note = f"between {where}; {pairs} pairs of neighbours measured in shape A"
     if best < profile.min_gap_mm - _GAP_TOLERANCE_MM:
-        note += f"; {profile.process} may fuse it: give a --clearance-mm above {best:.2f}"
+        note += f"; {profile.process} may fuse it: kits want a --clearance-mm above {best:.2f}"
     return [
         Check(
             "smallest gap between bodies",

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 __all__ = ["Thickness", "ray_thickness", "surface_area", "surface_samples"]
 
 
+#: Two surfaces whose normals are opposed to within 18 degrees are the two sides of a wall.
+_FACING = 0.95
+
+
 class Thickness(NamedTuple):
     """Thickness at points spread evenly over a surface.
 
@@ -25,10 +29,13 @@ class Thickness(NamedTuple):
         Points of the surface in mm.
     values : (k,) float64 array
         Distance through the material to the surface on the other side, mm.
+    opposed : (k,) bool array
+        Whether the surface on the other side faces the other way: a wall, and no edge or corner.
     """
 
     points: NDArray[np.float64]
     values: NDArray[np.float64]
+    opposed: NDArray[np.bool_]
 
     def share_below(self, limit_mm: float) -> float:
         """Share of the surface that is thinner than a limit in mm, 0 to 1."""
@@ -114,11 +121,14 @@ def ray_thickness(
     starts = points - skin * normals
     ends = points - reach_mm * normals
     values = np.full(count, reach_mm)
+    opposed = np.zeros(count, dtype=np.bool_)
     for index in range(count):
         hits = solid.ray_cast(tuple(starts[index]), tuple(ends[index]))
         for hit in hits:
             # Leaving the material; a hit from outside belongs to the start's own face.
-            if float(np.dot(hit.normal, -normals[index])) > 0.0:
+            facing = float(np.dot(hit.normal, -normals[index]))
+            if facing > 0.0:
                 values[index] = skin + hit.distance * (reach_mm - skin)
+                opposed[index] = facing > _FACING
                 break
-    return Thickness(points, values)
+    return Thickness(points, values, opposed)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from fabfold.joinery.bodies import Joinery
+from collections.abc import Sequence
+
+from fabfold.joinery.bodies import BodyMesh
 from fabfold.joinery.soundness import meshlab_set
 from fabfold.printing.checks import Check
 from fabfold.progress import Progress
@@ -10,12 +12,12 @@ from fabfold.progress import Progress
 __all__ = ["check_topology"]
 
 
-def check_topology(joinery: Joinery, progress: Progress) -> list[Check]:
+def check_topology(bodies: Sequence[BodyMesh], progress: Progress) -> list[Check]:
     """Check that every mesh is closed, two-manifold, one piece and free of self-intersections.
 
     Parameters
     ----------
-    joinery : Joinery
+    bodies : sequence of BodyMesh
         The printed bodies.
     progress : Progress
         Is told which body is looked at.
@@ -25,9 +27,9 @@ def check_topology(joinery: Joinery, progress: Progress) -> list[Check]:
     list of Check
         Four checks over all bodies, as MeshLab sees them.
     """
-    names = [body.name for body in joinery.bodies]
+    names = [body.name for body in bodies]
     opened, branching, pieces, crossing = [], [], [], []
-    for index, body in enumerate(joinery.bodies):
+    for index, body in enumerate(bodies):
         progress.update(0.4 * index / len(names), f"mesh of {body.name}")
         meshes = meshlab_set(body.vertices, body.faces)
         measures = meshes.get_topological_measures()

@@ -23,7 +23,7 @@ from fabfold.solid.surface import OpenSurfaceError, close_surface
 from fabfold.solid.topology import Points
 from fabfold.solid.union import MAX_TRIANGLES, unite
 
-__all__ = ["FORMATS", "load_solid", "solid_from_mesh"]
+__all__ = ["FORMATS", "load_solid", "read_mesh", "solid_from_mesh"]
 
 #: Suffixes that can be read.
 FORMATS = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".step", ".stp")
@@ -62,15 +62,37 @@ def load_solid(path: str | Path) -> Solid:
     refused.
     """
     path = Path(path)
+    raw = read_mesh(path)
+    return solid_from_mesh(path.stem, raw, sha256_of(path), label=path.name)
+
+
+def read_mesh(path: Path) -> RawMesh:
+    """Read the triangles of a file, nothing repaired.
+
+    Parameters
+    ----------
+    path : Path
+        A file with one of the suffixes :data:`FORMATS`.
+
+    Returns
+    -------
+    RawMesh
+        In the file's own units.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be read.
+    """
     read = _reader(path)
     try:
         raw = read(path)
-        digest = sha256_of(path)
     except OSError as error:
         raise ModelError(f"{path.name} cannot be read: {error.strerror or error}") from error
     except MemoryError as error:
         raise ModelError(f"{path.name} is too large for this computer's memory") from error
-    return solid_from_mesh(path.stem, raw, digest, label=path.name)
+    _check_numbers(path.name, raw)
+    return raw
 
 
 def _reader(path: Path) -> Callable[[Path], RawMesh]:
