@@ -11,11 +11,12 @@ import pytest
 
 from fabfold.apart.apart_checks import check_apart
 from fabfold.apart.apart_kit import prepare_apart
-from fabfold.apart.pin_order import comes_away, find_order, poses_in_mm, poses_to_try
+from fabfold.apart.pin_order import comes_away, find_order, poses_to_try
 from fabfold.apart.pin_replay import replay_assembly
 from fabfold.apart.plates import CONTACT_MM2, lay_out_plates, on_plate
 from fabfold.errors import CheckError, GeometryError, RecipeError
 from fabfold.joinery.bodies import BodyMesh
+from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.joinery.booleans import union
 from fabfold.joinery.build import build_bodies
 from fabfold.joinery.cells import as_manifold

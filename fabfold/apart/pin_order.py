@@ -19,12 +19,13 @@ from fabfold.errors import GeometryError
 from fabfold.export.raster import fill_depth
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
+from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.joinery.loose_pins import (
     PinBore,
     barrel_around,
-    body_solids,
     entry_channel,
     pin_rod,
+    solids_of,
 )
 from fabfold.progress import Progress
 from fabfold.tree.fold_tree import FoldTree
@@ -32,7 +33,7 @@ from fabfold.tree.fold_tree import FoldTree
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["AssemblyStep", "find_order", "poses_in_mm", "poses_to_try"]
+__all__ = ["AssemblyStep", "find_order", "poses_to_try"]
 
 Floats = NDArray[np.float64]
 
@@ -116,30 +117,6 @@ def poses_to_try(motion: Motion) -> list[Floats]:
     return list(found.values())
 
 
-def poses_in_mm(tree: FoldTree, joinery: Joinery, angles_deg: Floats) -> Floats:
-    """Rigid transform of every body in a pose.
-
-    Parameters
-    ----------
-    tree : FoldTree
-        The bodies and their hinges.
-    joinery : Joinery
-        It tells the voxel's side and the origin.
-    angles_deg : (h,) float64 array
-        Angles of all hinges in degrees.
-
-    Returns
-    -------
-    (b, 4, 4) float64 array
-        From shape A, mm.
-    """
-    poses = np.asarray(tree.body_poses(angles_deg), dtype=float).copy()
-    origin = np.asarray(joinery.origin_mm)
-    turned = np.einsum("bij,j->bi", poses[:, :3, :3], origin)
-    poses[:, :3, 3] = joinery.voxel_mm * poses[:, :3, 3] + origin - turned
-    return poses
-
-
 def find_order(
     tree: FoldTree,
     motion: Motion,
@@ -207,7 +184,7 @@ class _Disassembly:
     ) -> None:
         self._tree, self._joinery, self._bores = tree, joinery, bores
         self._angles = poses_to_try(motion)
-        self._solids = body_solids(joinery)
+        self._solids = solids_of(joinery)
         self._placed: dict[int, Floats] = {}
         self._posed: dict[tuple[int, int], manifold3d.Manifold] = {}
         self._rods = [

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.apart.pin_order import AssemblyStep, poses_in_mm
+from fabfold.apart.pin_order import AssemblyStep
 from fabfold.joinery.bodies import Joinery
+from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.joinery.booleans import evaluated
 from fabfold.joinery.cells import as_manifold
 from fabfold.joinery.loose_pins import PinBore, meshes_with_pins, pin_rod

@@ -188,7 +188,9 @@ def assembly_data(tree: FoldTree, joinery: Joinery, kit: ApartKit) -> dict[str, 
     }
 
 
-def bill_rows(joinery: Joinery, material: str, pin: str) -> list[tuple[str, int, str, str]]:
+def bill_rows(
+    joinery: Joinery, material: str, pin: str, magnets: tuple[int, str] = (0, "")
+) -> list[tuple[str, int, str, str]]:
     """What a kit is made of and what it takes to put it together.
 
     Parameters
@@ -199,6 +201,8 @@ def bill_rows(joinery: Joinery, material: str, pin: str) -> list[tuple[str, int,
         What is printed.
     pin : str
         Name of the loose pin, of :data:`fabfold.printing.print_mode.PINS`.
+    magnets : (int, str)
+        Number and size of the magnets.
 
     Returns
     -------
@@ -210,6 +214,10 @@ def bill_rows(joinery: Joinery, material: str, pin: str) -> list[tuple[str, int,
         (f"{material or 'material'}, printed", len(joinery.bodies), f"{volume:.1f} cm³ in all",
          "bodies; with infill it takes less"),
     ]  # fmt: skip
+    if magnets[0]:
+        size = " × ".join(magnets[1].split("x")) + " mm"
+        rows.append(("disc magnet, neodymium", magnets[0], size, "hold the box shut"))
+        rows.append(("glue", 1, "", "for the magnets"))
     if not joinery.pins:
         return rows
     what = PINS[pin][1]
@@ -225,10 +233,12 @@ def bill_rows(joinery: Joinery, material: str, pin: str) -> list[tuple[str, int,
     return rows
 
 
-def write_bill(folder: Path, joinery: Joinery, material: str, pin: str) -> None:
+def write_bill(
+    folder: Path, joinery: Joinery, material: str, pin: str, magnets: tuple[int, str] = (0, "")
+) -> None:
     """Write ``bom.csv``; parameters as of :func:`bill_rows`."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["item", "count", "size", "what for"])
-    writer.writerows(bill_rows(joinery, material, pin))
+    writer.writerows(bill_rows(joinery, material, pin, magnets))
     write_text(folder / "bom.csv", text.getvalue())

@@ -10,6 +10,44 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fabfold.cli.options import (
+    ClearanceMm,
+    Closed,
+    DoubleWeight,
+    DropBelow,
+    Effort,
+    Joints,
+    JointsInside,
+    Json,
+    Keep,
+    KeepWeight,
+    MagnetName,
+    Origin,
+    Output,
+    Pareto,
+    Pick,
+    PinName,
+    Pitch,
+    Prefer,
+    Print,
+    ProfileName,
+    Protect,
+    Quiet,
+    RetentionName,
+    Rotation,
+    Rounds,
+    Scheduler,
+    Seed,
+    Share,
+    Source,
+    TemplateCells,
+    TemplateName,
+    Thicken,
+    Time,
+    Void,
+    VoxelMm,
+    Workers,
+)
 from fabfold.errors import CheckError, FabfoldError, RecipeError
 from fabfold.version import __version__
 
@@ -26,225 +64,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-
-Source = Annotated[
-    str,
-    typer.Argument(
-        metavar="MODEL",
-        help="STL, OBJ, PLY, OFF, GLB, 3MF or STEP file; sample:NAME; a kit.toml; or a kit folder.",
-        show_default=False,
-    ),
-]
-Output = Annotated[
-    Path | None,
-    typer.Option("--output", "-o", metavar="KIT", help="Kit folder. Default: NAME-kit."),
-]
-TemplateName = Annotated[
-    str | None,
-    typer.Option(
-        "--template",
-        "-t",
-        help="Target shape: box-AxBxC, a name of 'fabfold list templates', a .toml file, or a "
-        "mesh. Default: the sample's own, else box-4x4x4.",
-    ),
-]
-TemplateCells = Annotated[
-    int | None,
-    typer.Option(
-        "--template-cells",
-        help="Cells of a target that is a mesh. Default: the best match from 32 to 128.",
-    ),
-]
-VoxelMm = Annotated[
-    float | None, typer.Option("--voxel-mm", help="Printed side of a voxel in mm. Default: 20.")
-]
-ProfileName = Annotated[
-    str | None,
-    typer.Option(
-        "--profile",
-        help="Printer and material: a name of 'fabfold list profiles', or a .toml file.",
-    ),
-]
-ClearanceMm = Annotated[
-    float | None,
-    typer.Option("--clearance-mm", help="Clearance in the hinges. Default: the profile's."),
-]
-Print = Annotated[
-    str | None,
-    typer.Option(
-        "--print",
-        metavar="auto|in-place|apart",
-        help="As one object that is closed (in-place), or body by body on plates, with pins that "
-        "are pushed in (apart). Default: what the profile can (auto).",
-    ),
-]
-PinName = Annotated[
-    str | None,
-    typer.Option(
-        "--pin",
-        metavar="1.75|2.85|rod-2",
-        help="Pin of bodies that are printed apart: a piece of filament, or of rod. Default: 1.75.",
-    ),
-]
-Seed = Annotated[
-    int | None, typer.Option("--seed", help="Seed of every random choice. Default: 1.")
-]
-Effort = Annotated[
-    str | None, typer.Option("--effort", help="quick, normal (default) or thorough search.")
-]
-Rounds = Annotated[
-    int | None, typer.Option("--rounds", help="Rounds of seeds before giving up. Default: 8.")
-]
-Closed = Annotated[
-    float | None,
-    typer.Option(
-        "--closed",
-        help="Search until the box is closed to this share, such as 0.85, or say it cannot be.",
-        show_default=False,
-    ),
-]
-Rotation = Annotated[
-    str | None,
-    typer.Option(
-        "--rotation", metavar="X,Y,Z", help="Turn the model by hand, degrees about x, y, z."
-    ),
-]
-Origin = Annotated[
-    str | None,
-    typer.Option(
-        "--origin",
-        metavar="X,Y,Z",
-        help="Corner of the grid by hand, in model units after the rotation.",
-    ),
-]
-Pitch = Annotated[float | None, typer.Option("--pitch", help="Voxel side by hand, in model units.")]
-DropBelow = Annotated[
-    float | None,
-    typer.Option(
-        "--drop-below", help="Drop cells with less material than this share. Default: 0.04."
-    ),
-]
-Thicken = Annotated[
-    str | None,
-    typer.Option(
-        "--thicken",
-        metavar="auto|off|MM",
-        help="Thicken what is too thin for walls and hinges: where nothing else works (auto), "
-        "never (off), or all that is thinner than MM, in mm as printed. Default: auto.",
-    ),
-]
-Prefer = Annotated[
-    str | None,
-    typer.Option(
-        "--prefer",
-        metavar="hinges|surface|balanced|0..1",
-        help="Fewest hinges (0), the best surface (1), or between. Default: balanced (0.5).",
-    ),
-]
-Void = Annotated[
-    str | None,
-    typer.Option(
-        "--void",
-        metavar="inside|even|surface|-1..1",
-        help="Where empty space goes: inside the box (1), at its surface (-1). Default: even (0).",
-    ),
-]
-Keep = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--keep",
-        metavar="WHAT:SIDE",
-        help="Show a part of the model on a side of the box: 'front:+x', 'top:+z' (front is the "
-        "model's -y), or a region such as 'box(0,0,50%,100%,100%,100%):top'. Repeatable.",
-    ),
-]
-KeepWeight = Annotated[
-    float | None,
-    typer.Option("--keep-weight", help="How much --keep counts; a hinge is 0.1. Default: 0.3."),
-]
-Protect = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--protect",
-        metavar="REGION",
-        help="No cut may cross this region of the model: 'sphere(x,y,z,r)', "
-        "'box(x0,y0,z0,x1,y1,z1)' in model units or with % of its extent, 'painted' or "
-        "'painted(#rrggbb)' for faces in another colour. Repeatable.",
-    ),
-]
-Joints = Annotated[
-    str | None,
-    typer.Option(
-        "--joints",
-        help="Hinges to search with: S (single, the default), S+D (double ones too), S90 or all "
-        "(quarter turns too).",
-    ),
-]
-DoubleWeight = Annotated[
-    float | None,
-    typer.Option(
-        "--double-weight", help="Energy of a double hinge; a single is 0.1. Default: 0.12."
-    ),
-]
-JointsInside = Annotated[
-    bool | None,
-    typer.Option(
-        "--joints-inside/--joints-anywhere",
-        help="No hinge on the visible faces of the box; it needs a template with some cells to "
-        "spare, and finds less. Default: anywhere.",
-        show_default=False,
-    ),
-]
-Share = Annotated[
-    bool | None,
-    typer.Option(
-        "--share/--no-share",
-        help="Two partly filled voxels may share a cell of the box where their material does not "
-        "overlap. Default: no.",
-        show_default=False,
-    ),
-]
-Pick = Annotated[
-    int | None,
-    typer.Option("--pick", min=0, help="Go on with this solution of 'fit --pareto'; 0 unpicks."),
-]
-Pareto = Annotated[
-    bool,
-    typer.Option(
-        "--pareto",
-        help="List the solutions between fewest joints and best surface, with a picture of each.",
-    ),
-]
-Workers = Annotated[
-    int | None,
-    typer.Option(
-        "--workers", "-j", help="Processes of the search. Default: one a core. Changes no result."
-    ),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="tcp://HOST:PORT",
-        help="Search on the workers of this Dask scheduler instead. Changes no result.",
-    ),
-]
-Time = Annotated[
-    float | None,
-    typer.Option(
-        "--time",
-        metavar="SECONDS",
-        min=0,
-        help="Search for so long, then go on with the best so far; 0 takes what earlier runs left. "
-        "The result depends on how fast the machine is; without this option it never does.",
-        show_default=False,
-    ),
-]
-Json = Annotated[
-    bool,
-    typer.Option("--json", help="With 'check': the checks as JSON, and nothing else."),
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")]
 
 
 def _guarded(command: Callable[..., None]) -> Callable[..., None]:
@@ -316,6 +135,8 @@ def _stage(name: str, summary: str) -> None:
         clearance_mm: ClearanceMm = None,
         print: Print = None,
         pin: PinName = None,
+        retention: RetentionName = None,
+        magnet: MagnetName = None,
         seed: Seed = None,
         effort: Effort = None,
         rounds: Rounds = None,

@@ -14,6 +14,7 @@ from fabfold.export.render import Image, png_bytes, render
 from fabfold.files import write_bytes
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
+from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.lattice.rotations import ROTATIONS
 from fabfold.tree.fold_tree import FoldTree
 
@@ -27,10 +28,7 @@ def _poses_mm(
     upright: NDArray[np.float64] | None,
 ) -> NDArray[np.float64]:
     """Poses (b, 4, 4) of the bodies in mm, turned by the rotation `upright` if there is one."""
-    to_mm = np.eye(4)
-    to_mm[:3, :3] *= joinery.voxel_mm
-    to_mm[:3, 3] = joinery.origin_mm
-    poses = to_mm @ tree.body_poses(angles_deg) @ np.linalg.inv(to_mm)
+    poses = poses_in_mm(tree, joinery, angles_deg)
     if upright is not None:
         turn = np.eye(4)
         turn[:3, :3] = upright

@@ -29,11 +29,12 @@ __all__ = [
     "PUSHER_MM",
     "PinBore",
     "barrel_around",
-    "body_solids",
+    "cylinder_between",
     "entry_channel",
     "meshes_with_pins",
     "pin_bores",
     "pin_rod",
+    "solids_of",
     "with_pins",
 ]
 
@@ -137,8 +138,25 @@ def _one_line(hinges: Sequence[Hinge]) -> bool:
     return bool(np.ptp(points, axis=0).max() < 1e-6)
 
 
-def _cylinder(start: Floats, end: Floats, radius: float, *, outside: bool) -> manifold3d.Manifold:
-    """A cylinder between two points; its facets lie outside the true one, or inside."""
+def cylinder_between(
+    start: Floats, end: Floats, radius: float, *, outside: bool
+) -> manifold3d.Manifold:
+    """A cylinder between two points.
+
+    Parameters
+    ----------
+    start, end : (3,) float64 array
+        Middles of its ends, mm.
+    radius : float
+        Radius, mm.
+    outside : bool
+        Whether its facets lie outside the true cylinder, or inside.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In mm.
+    """
     import manifold3d
 
     along = end - start
@@ -174,7 +192,7 @@ def entry_channel(bore: PinBore, end: int, joinery: Joinery, slip_mm: float) -> 
     """
     face = bore.face(end)
     radius = joinery.pin_radius_mm + slip_mm + CHANNEL_MM
-    return _cylinder(face, face + end * PUSHER_MM * bore.axis, radius, outside=True)
+    return cylinder_between(face, face + end * PUSHER_MM * bore.axis, radius, outside=True)
 
 
 def barrel_around(bore: PinBore, joinery: Joinery) -> manifold3d.Manifold:
@@ -192,7 +210,7 @@ def barrel_around(bore: PinBore, joinery: Joinery) -> manifold3d.Manifold:
     manifold3d.Manifold
         In mm, shape A.
     """
-    return _cylinder(bore.face(-1), bore.face(1), joinery.barrel_radius_mm, outside=True)
+    return cylinder_between(bore.face(-1), bore.face(1), joinery.barrel_radius_mm, outside=True)
 
 
 def pin_rod(
@@ -218,10 +236,10 @@ def pin_rod(
     """
     face = bore.face(end)
     start = bore.face(-end) + end * WEB_MM * bore.axis if from_web else face
-    return _cylinder(start, face + end * PUSHER_MM * bore.axis, radius_mm, outside=True)
+    return cylinder_between(start, face + end * PUSHER_MM * bore.axis, radius_mm, outside=True)
 
 
-def body_solids(joinery: Joinery) -> list[manifold3d.Manifold]:
+def solids_of(joinery: Joinery) -> list[manifold3d.Manifold]:
     """The bodies as solids, mm, shape A."""
     return [as_manifold(body.vertices, body.faces, body.name) for body in joinery.bodies]
 
@@ -262,8 +280,10 @@ def with_pins(
             cuts.setdefault(body, []).append(channel)
         inner = -end * bore.axis
         outside, inside = bore.face(-end), bore.face(-end) - WEB_MM * inner
-        plug = _cylinder(inside, outside, joinery.pin_radius_mm + grip_mm + _BITE_MM, outside=False)
-        hole = _cylinder(inside - inner, outside + inner, PUSH_OUT_MM / 2, outside=True)
+        plug = cylinder_between(
+            inside, outside, joinery.pin_radius_mm + grip_mm + _BITE_MM, outside=False
+        )
+        hole = cylinder_between(inside - inner, outside + inner, PUSH_OUT_MM / 2, outside=True)
         webs.setdefault(bore.owner, []).append(plug - hole)
         tip, tail = inside, bore.face(end) - end * _SHORT_MM * bore.axis
         pins.append(
@@ -309,7 +329,7 @@ def meshes_with_pins(joinery: Joinery) -> list[tuple[Floats, NDArray[np.int32]]]
     """
     meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     for pin in joinery.pins:
-        solid = _cylinder(
+        solid = cylinder_between(
             np.array(pin.tip_mm), np.array(pin.tail_mm), pin.diameter_mm / 2, outside=True
         )
         made = solid.to_mesh64()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fabfold.joinery.loose_pins import meshes_with_pins
+from fabfold.joinery.magnets import Retention
 from fabfold.kit.stages import BuiltTree
 from fabfold.printing.body_checks import check_bodies
 from fabfold.printing.checks import Check
@@ -84,6 +85,8 @@ def run_checks(built: BuiltTree, mode: PrintMode, progress: Progress) -> list[Ch
 
         progress.update(0.05, "putting it together")
         checks += check_apart(tree, joinery, built.apart)
+    if built.retention is not None:
+        checks.append(_held(built, built.retention))
     progress.update(0.1, "printability")
     checks += check_bodies(joinery, tree, motion, profile, progress)
     progress.update(0.5, "every degree of the path")
@@ -128,6 +131,24 @@ def _lies(mode: PrintMode) -> Check:
             else f"{mode.profile.name} fuses the gap under every face of the closed kit; print it "
             "body by body with --print apart, or take a powder profile such as mjf-pa12"
         ),
+    )
+
+
+def _held(built: BuiltTree, retention: Retention) -> Check:
+    """How many hinges do not move when the box is shut."""
+    hinges = built.planned.tree.hinges
+    free = [hinges[index].name for index in retention.free_after]
+    note = f"{len(retention.pairs)} pairs of {retention.magnet} mm magnets; without them "
+    note += f"{len(retention.free_before)} hinges move"
+    if free:
+        note += f". Held by friction only: {', '.join(free)}"
+    return Check(
+        name="hinges held shut",
+        figure=float(len(hinges) - len(free)),
+        limit=None,
+        unit=f"of {len(hinges)} hinges",
+        ok=True,
+        note=note,
     )
 
 

@@ -68,7 +68,7 @@ def join_key(recipe: Recipe, template: Template, mode: PrintMode, mark: list[Any
         fold_key(recipe, template, mark),
         recipe.voxel_mm,
         mode.profile.model_dump(mode="json"),
-        [mode.name, *([mode.pin] if mode.apart else [])],
+        [mode.name, *([mode.pin] if mode.apart else []), mode.magnet],
     )
 
 

@@ -304,8 +304,9 @@ class Kit(StageRunner):
         from fabfold.printing.profiles import load_profile
 
         recipe = self.recipe
+        magnet = recipe.magnet if recipe.retention == "magnet" else ""
         return print_mode(
-            load_profile(recipe.profile), recipe.print, recipe.pin, recipe.clearance_mm
+            load_profile(recipe.profile), recipe.print, recipe.pin, recipe.clearance_mm, magnet
         )
 
     def profile(self) -> Profile:

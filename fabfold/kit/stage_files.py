@@ -124,6 +124,7 @@ def save_built(store: StageStore, built: BuiltTree) -> list[str]:
         "motion": built.planned.motion.to_json(),
         "refused": list(built.refused),
         "apart": None if built.apart is None else built.apart.to_json(),
+        "retention": None if built.retention is None else built.retention.to_json(),
         "pins": [dataclasses.asdict(pin) for pin in joinery.pins],
     }
     write_json(store.path("made.json"), content)
@@ -145,6 +146,7 @@ def save_built(store: StageStore, built: BuiltTree) -> list[str]:
 def load_built(store: StageStore, files: list[str]) -> BuiltTree:
     """Read what :func:`save_built` wrote."""
     from fabfold.apart.apart_kit import ApartKit
+    from fabfold.joinery.magnets import Retention
 
     data = json.loads(store.path("made.json").read_text(encoding="utf-8"))
     planned = PlannedTree(
@@ -166,7 +168,9 @@ def load_built(store: StageStore, files: list[str]) -> BuiltTree:
     )
     apart = None if data["apart"] is None else ApartKit.from_json(data["apart"])
     joinery = Joinery(bodies=bodies, pins=pins, **about)
-    return BuiltTree(planned, joinery, tuple(data["refused"]), apart)
+    kept = data["retention"]
+    retention = None if kept is None else Retention.from_json(kept)
+    return BuiltTree(planned, joinery, tuple(data["refused"]), apart, retention)
 
 
 def _as_tuple(value: Any) -> Any:

@@ -15,6 +15,7 @@ from fabfold.voxels.voxel_model import Voxels
 
 if TYPE_CHECKING:
     from fabfold.apart.apart_kit import ApartKit
+    from fabfold.joinery.magnets import Retention
     from fabfold.printing.print_mode import PrintMode
 
 __all__ = ["BuiltTree", "PlannedTree", "build", "build_first"]
@@ -43,12 +44,15 @@ class BuiltTree:
         Why each better-ranked tree was passed over.
     apart : ApartKit or None
         Order of assembly and plates of a kit that is printed body by body.
+    retention : Retention or None
+        What holds the box shut, where that was asked for.
     """
 
     planned: PlannedTree
     joinery: Joinery
     refused: tuple[str, ...]
     apart: ApartKit | None = None
+    retention: Retention | None = None
 
 
 def build(
@@ -84,7 +88,7 @@ def build(
     from fabfold.joinery.loose_pins import meshes_with_pins
     from fabfold.proof.certify import certify
 
-    profile, apart = mode.profile, None
+    profile, apart, retention = mode.profile, None, None
     joinery = build_bodies(
         planned.voxels,
         planned.tree,
@@ -99,6 +103,11 @@ def build(
         from fabfold.apart.apart_kit import prepare_apart
 
         joinery, apart = prepare_apart(planned.tree, planned.motion, joinery, profile, progress)
+    if mode.magnet:
+        from fabfold.joinery.magnets import MAGNETS, hold_shut
+
+        progress.update(None, "places for magnets")
+        joinery, retention = hold_shut(planned.tree, planned.motion, joinery, MAGNETS[mode.magnet])
     certificate = certify(
         planned.tree,
         planned.motion,
@@ -109,7 +118,7 @@ def build(
         progress=progress,
     )
     motion = replace(planned.motion, certificate=certificate)
-    return BuiltTree(replace(planned, motion=motion), joinery, refused, apart)
+    return BuiltTree(replace(planned, motion=motion), joinery, refused, apart, retention)
 
 
 def build_first(

@@ -18,6 +18,7 @@ from fabfold.export.stl import write_stl
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.export.urdf import write_urdf
 from fabfold.files import write_bytes, write_json, write_text
+from fabfold.joinery.magnets import Retention
 from fabfold.kit.box_closure import BoxClosure
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.lattice.template import Template
@@ -118,9 +119,47 @@ def kit_summary(
         "volume_mm3": round(sum(body.volume for body in joinery.bodies), 1),
         "print": "in-place" if built.apart is None else "apart",
         **_printed_apart(built),
+        **(
+            {}
+            if built.retention is None
+            else {
+                "magnet_pairs": len(built.retention.pairs),
+                "hinges_free_when_shut": [
+                    tree.hinges[index].name for index in built.retention.free_after
+                ],
+            }
+        ),
         "notes": list(joinery.notes),
         "refused_trees": list(built.refused),
         **({"wishes": list(wishes)} if wishes else {}),
+    }
+
+
+def _retention_data(built: BuiltTree, retention: Retention) -> dict[str, Any]:
+    """What ``retention.json`` holds."""
+    names = [body.name for body in built.joinery.bodies]
+    hinges = built.planned.tree.hinges
+    return {
+        "format": "fabfold-retention",
+        "version": 1,
+        "magnet_mm": [float(part) for part in retention.magnet.split("x")],
+        "pairs": [
+            {
+                "north_out": {
+                    "body": names[pair.bodies[0]],
+                    "mouth_mm": list(pair.points_mm[0]),
+                    "inwards": list(pair.inwards[0]),
+                },
+                "south_out": {
+                    "body": names[pair.bodies[1]],
+                    "mouth_mm": list(pair.points_mm[1]),
+                    "inwards": list(pair.inwards[1]),
+                },
+            }
+            for pair in retention.pairs
+        ],
+        "moves_without": [hinges[index].name for index in retention.free_before],
+        "held_by_friction_only": [hinges[index].name for index in retention.free_after],
     }
 
 
@@ -220,8 +259,13 @@ def write_printable(folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltT
             colours=colours,
             layout="assembly",
         )
+    if built.retention is not None:
+        write_json(folder / "retention.json", _retention_data(built, built.retention))
+    else:
+        (folder / "retention.json").unlink(missing_ok=True)
     write_urdf(folder / f"{name}.urdf", joinery, tree, built.planned.motion, name)
-    write_bill(folder, joinery, mode.profile.material, mode.pin)
+    magnets = 0 if built.retention is None else 2 * len(built.retention.pairs)
+    write_bill(folder, joinery, mode.profile.material, mode.pin, (magnets, mode.magnet))
 
 
 def write_checks(

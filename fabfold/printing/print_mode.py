@@ -35,12 +35,16 @@ class PrintMode:
         Printer and material, with the clearance and the smallest gap of this way.
     pin : str
         Name of the loose pin, of :data:`PINS`.
+    magnet : str
+        Name of the magnets that hold the box shut, of :data:`fabfold.joinery.magnets.MAGNETS`;
+        empty where nothing does.
     """
 
     apart: bool
     why: str
     profile: Profile
     pin: str
+    magnet: str = ""
 
     @property
     def name(self) -> str:
@@ -63,7 +67,11 @@ class PrintMode:
 
 
 def print_mode(
-    profile: Profile, asked: str = "auto", pin: str = "1.75", clearance_mm: float | None = None
+    profile: Profile,
+    asked: str = "auto",
+    pin: str = "1.75",
+    clearance_mm: float | None = None,
+    magnet: str = "",
 ) -> PrintMode:
     """Choose how a kit is printed.
 
@@ -77,6 +85,8 @@ def print_mode(
         Name of the loose pin, of :data:`PINS`.
     clearance_mm : float, optional
         Clearance in the hinges, mm, in place of the profile's.
+    magnet : str
+        Name of the magnets that hold the box shut; empty for none.
 
     Returns
     -------
@@ -103,4 +113,4 @@ def print_mode(
             f"at least; give more than that (its own clearance is {gaps.clearance_mm:g} mm)"
         )
     gapped = profile.model_copy(update={"clearance_mm": clearance, "min_gap_mm": gaps.min_gap_mm})
-    return PrintMode(apart, why, gapped, pin)
+    return PrintMode(apart, why, gapped, pin, magnet)

@@ -60,6 +60,12 @@ class Recipe(BaseModel):
         Literal["1.75", "2.85", "rod-2"],
         Field(description="loose pin of bodies printed apart: filament 1.75 or 2.85, rod-2"),
     ] = "1.75"
+    retention: Annotated[
+        Literal["none", "magnet"], Field(description="what holds the box shut: none, or magnet")
+    ] = "none"
+    magnet: Annotated[
+        Literal["3x1", "4x2", "5x2"], Field(description="disc magnets, diameter x thickness in mm")
+    ] = "3x1"
     seed: Annotated[int, Field(ge=0, lt=2**31, description="seed of every random choice")] = 1
     effort: Annotated[
         Literal["quick", "normal", "thorough"], Field(description="how long the search goes on")
