@@ -25,6 +25,7 @@ from fabfold.errors import FabfoldError
 from fabfold.export.threemf import write_3mf
 from fabfold.joinery.build import build_bodies
 from fabfold.joinery.loose_pins import meshes_with_pins, pin_bores, with_pins
+from fabfold.joinery.magnets import MAGNETS, hold_shut
 from fabfold.kit.kit import open_kit
 from fabfold.printing.print_mode import print_mode
 from fabfold.printing.profiles import load_profile
@@ -93,12 +94,16 @@ def row_of(folder: Path, slicing: bool) -> dict[str, Any]:
             tree, motion, meshes_with_pins(joinery), 20.0, joinery.origin_mm, fit.min_gap_mm
         )
         lap("proof")
+        _, kept = hold_shut(tree, motion, joinery, MAGNETS["3x1"])
+        lap("magnets")
     except FabfoldError as error:
         return {**row, "error": str(error)}
     row |= {
         "pins": f"{seen.done} of {seen.pins}",
         "poses": len({step.angles_deg for step in steps}),
         "gap": proof["min_gap_mm"],
+        "moves": [len(kept.free_before), len(kept.free_after), len(kept.pairs)],
+        "hinges": len(tree.hinges),
         "cm3": sum(body.volume for body in joinery.bodies) / 1000,
         "beds": {},
     }
@@ -160,7 +165,19 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
             f"| {name} | {row['bodies']} | {row['pins']} | {row['poses']} | {row['gap']:.3f} |"
             f" {row['cm3']:.0f} |" + "".join(cells) + f" {supported} |"
         )
-    steps = ("bodies", "order", "pins", "replay", "proof", "plates")
+    lines += [
+        "",
+        "With `--retention magnet`: hinges that move, to first order, when the box is shut, and",
+        "with pairs of magnets of 3 × 1 mm; what is left is held by friction only.",
+        "",
+        "| kit | hinges | move when shut | with magnets | pairs |",
+        "|---|--:|--:|--:|--:|",
+    ]
+    for name, row in rows.items():
+        if "error" not in row:
+            before, after, pairs = row["moves"]
+            lines.append(f"| {name} | {row['hinges']} | {before} | {after} | {pairs} |")
+    steps = ("bodies", "order", "pins", "replay", "proof", "plates", "magnets")
     lines += [
         "",
         "Processor seconds. *Bodies* and *proof* are made for every kit; order, pins, replay and",

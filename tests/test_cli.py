@@ -125,3 +125,16 @@ def test_wrong_ways_to_run_the_search_are_one_sentence_and_exit_code_2(
     for word in words:
         assert word in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["bar.stl"], "nothing is half written"
+
+
+def test_the_size_of_the_box_sets_the_voxel(tmp_path):
+    from fabfold.errors import RecipeError
+    from fabfold.kit.kit import open_kit
+
+    assert open_kit("sample:car", box_mm=60.0).recipe.voxel_mm == 15.0
+    assert open_kit("sample:car", scale=0.75).recipe.voxel_mm == 15.0
+    for wrong in ({"box_mm": 0.0}, {"scale": -1.0}, {"box_mm": 60.0, "scale": 2.0}):
+        with pytest.raises(RecipeError, match="--"):
+            open_kit("sample:car", **wrong)
+    with pytest.raises(RecipeError, match="--voxel-mm sets the size too"):
+        open_kit("sample:car", voxel_mm=20.0, box_mm=60.0)

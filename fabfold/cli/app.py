@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fabfold.cli.options import (
+    BoxMm,
     ClearanceMm,
     Closed,
     DoubleWeight,
@@ -36,6 +37,7 @@ from fabfold.cli.options import (
     RetentionName,
     Rotation,
     Rounds,
+    Scale,
     Scheduler,
     Seed,
     Share,
@@ -131,6 +133,8 @@ def _stage(name: str, summary: str) -> None:
         template: TemplateName = None,
         template_cells: TemplateCells = None,
         voxel_mm: VoxelMm = None,
+        box_mm: BoxMm = None,
+        scale: Scale = None,
         profile: ProfileName = None,
         clearance_mm: ClearanceMm = None,
         print: Print = None,

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 __all__ = [
+    "BoxMm",
     "ClearanceMm",
     "Closed",
     "DoubleWeight",
@@ -33,6 +34,7 @@ __all__ = [
     "RetentionName",
     "Rotation",
     "Rounds",
+    "Scale",
     "Scheduler",
     "Seed",
     "Share",
@@ -76,6 +78,22 @@ TemplateCells = Annotated[
 ]
 VoxelMm = Annotated[
     float | None, typer.Option("--voxel-mm", help="Printed side of a voxel in mm. Default: 20.")
+]
+BoxMm = Annotated[
+    float | None,
+    typer.Option(
+        "--box-mm",
+        help="Longest side of the finished box in mm; sets --voxel-mm.",
+        show_default=False,
+    ),
+]
+Scale = Annotated[
+    float | None,
+    typer.Option(
+        "--scale",
+        help="Size against the usual one, whose voxels are 20 mm; sets --voxel-mm.",
+        show_default=False,
+    ),
 ]
 ProfileName = Annotated[
     str | None,

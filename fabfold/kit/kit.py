@@ -21,7 +21,7 @@ from fabfold.kit.stages import BuiltTree, PlannedTree, build_first
 from fabfold.lattice.template import Template
 from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
-from fabfold.recipe.start import require_free_folder, set_up_project
+from fabfold.recipe.start import require_free_folder, set_up_project, with_size
 from fabfold.recipe.targets import load_target
 from fabfold.store import StageStore
 
@@ -443,6 +443,8 @@ def open_kit(
     workers: int | None = None,
     scheduler: str | None = None,
     seconds: float | None = None,
+    box_mm: float | None = None,
+    scale: float | None = None,
     **options: Any,
 ) -> Kit:
     """Kit of a model file, ``sample:NAME``, a ``kit.toml`` or a kit folder.
@@ -455,6 +457,10 @@ def open_kit(
         Kit folder; for a kit folder or its ``kit.toml`` the default is that folder.
     workers, scheduler, seconds
         How the search runs, as of :class:`Kit`.
+    box_mm : float, optional
+        Longest side of the finished box, mm; sets the recipe's `voxel_mm`.
+    scale : float, optional
+        Size against the usual one, whose voxels are 20 mm; sets `voxel_mm` too.
     **options
         Fields of the recipe; those that are None keep the recipe's or the default value.
 
@@ -465,7 +471,9 @@ def open_kit(
     RecipeError
         If the recipe or an option is wrong.
     """
-    start = set_up_project(source, folder, options)
+    if options.get("voxel_mm") is not None and (box_mm is not None or scale is not None):
+        raise RecipeError("--voxel-mm sets the size too: leave out --box-mm and --scale")
+    start = with_size(set_up_project(source, folder, options), box_mm, scale)
     return Kit(
         start.recipe,
         model=start.model,

@@ -82,13 +82,16 @@ def _check_fit(joinery: Joinery, in_place: bool, bed_mm: Floats) -> Check:
     bed = np.sort(bed_mm)
     name, span = max(spans, key=lambda item: float((np.sort(item[1]) / bed).max()))
     share = float((np.sort(span) / bed).max())
+    note = f"{name}, {_size(span)}, in a build volume of {_size(bed_mm)}"
+    if share > 1.0:
+        note += f"; --voxel-mm {np.floor(10 * joinery.voxel_mm / share) / 10:g} fits"
     return Check(
         "fits the printer",
         100.0 * share,
         100.0,
         "%",
         share <= 1.0,
-        f"{name}, {_size(span)}, in a build volume of {_size(bed_mm)}",
+        note,
     )
 
 

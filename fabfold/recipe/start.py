@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fabfold.errors import KitError, ModelError
+from fabfold.errors import KitError, ModelError, RecipeError
 from fabfold.files import sha256_of
 from fabfold.recipe.recipe import Recipe, make_recipe, read_recipe
-from fabfold.recipe.targets import find_input, is_file_name, named_target
+from fabfold.recipe.targets import find_input, is_file_name, load_target, named_target
 
-__all__ = ["ProjectSetup", "require_free_folder", "set_up_project"]
+__all__ = ["ProjectSetup", "require_free_folder", "set_up_project", "with_size"]
 
 #: Target of a model that says nothing of its own.
 _USUAL = "box-4x4x4"
@@ -100,6 +100,41 @@ def _from_recipe(
     if not recipe.model.startswith("sample:"):
         model = find_input(recipe.model, recipe.sha256, path.parent, "model")
     return ProjectSetup(recipe, model, template, folder)
+
+
+def with_size(start: ProjectSetup, box_mm: float | None, scale: float | None) -> ProjectSetup:
+    """The same with the size of a voxel that makes the box as large as asked for.
+
+    Parameters
+    ----------
+    start : ProjectSetup
+        What a kit starts from.
+    box_mm : float or None
+        Longest side of the finished box, mm.
+    scale : float or None
+        Size against the usual one, whose voxels are 20 mm.
+
+    Raises
+    ------
+    RecipeError
+        If both are given, or one is no size.
+    """
+    if box_mm is None and scale is None:
+        return start
+    if box_mm is not None and scale is not None:
+        raise RecipeError("--box-mm and --scale both set the size: give one of them")
+    value = box_mm if box_mm is not None else scale
+    if value is None or not 0.0 < value < 1e5:
+        option = "--scale" if box_mm is None else "--box-mm"
+        raise RecipeError(f"{option} {value}: must be a number above 0")
+    recipe = start.recipe
+    usual = float(type(recipe).model_fields["voxel_mm"].default)
+    voxel = usual * value
+    if box_mm is not None:
+        template = load_target(recipe.template, start.template, recipe.template_cells)
+        voxel = box_mm / max(template.shape)
+    content = {**recipe.model_dump(), "voxel_mm": round(voxel, 4)}
+    return replace(start, recipe=make_recipe(**content))
 
 
 def require_free_folder(folder: Path) -> None:
