@@ -357,7 +357,7 @@ def _prove(
 
     from fabfold.errors import CheckError, GeometryError
     from fabfold.fold.motion import motion_of
-    from fabfold.kit.stages import PlannedTree
+    from fabfold.kit.stages import PlannedTree, build
     from fabfold.progress import SilentProgress
     from fabfold.proof.sampled import sample_path
     from fabfold.tree.fold_tree import FoldTree
@@ -372,7 +372,7 @@ def _prove(
         return {"ok": False, "why": f"tree: {faults[0]}"}
     planned = PlannedTree(rounds.options[entry["option"]], tree, motion_of(tree, path))
     try:
-        made = kit._build(planned, kit.profile(), (), SilentProgress())
+        made = build(planned, kit.print_mode(), kit.recipe.voxel_mm, (), SilentProgress())
     except (GeometryError, CheckError) as error:
         return {"ok": False, "why": str(error), "seconds": time.process_time() - start}
     certified = time.process_time()

@@ -65,13 +65,15 @@ def proven(voxels: Voxels, candidate: Candidate) -> str:
     from fabfold.errors import FabfoldError
     from fabfold.fold.motion import motion_of
     from fabfold.kit.stages import PlannedTree, build
+    from fabfold.printing.print_mode import print_mode
     from fabfold.printing.profiles import load_profile
     from fabfold.progress import SilentProgress
 
     profile = load_profile("sla-tough").model_copy(update={"clearance_mm": 0.3, "min_gap_mm": 0.25})
     planned = PlannedTree(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
     try:
-        made = build(planned, profile, 20.0, (), SilentProgress())
+        mode = print_mode(profile, "in-place")
+        made = build(planned, mode, 20.0, (), SilentProgress())
     except FabfoldError as error:
         return str(error)
     return f"{made.planned.motion.certificate['min_gap_mm']:.3f} mm"

@@ -177,14 +177,59 @@ def _best_offsets(profile, planes, area, limit, energy, move_cost):  # type: ign
     return offsets, best[count - 1, limit]
 
 
-def _profile(table: NDArray[np.int32], planes: Planes, axis: int) -> NDArray[np.int32]:
-    """Material below each position along `axis`, in each column of cells of the other two."""
-    others = [other for other in range(3) if other != axis]
-    view = np.moveaxis(table, axis, 0)
-    rows = np.clip(planes[others[0]], 0, view.shape[1] - 1)
-    columns = np.clip(planes[others[1]], 0, view.shape[2] - 1)
-    corners = view[:, rows[:, None], columns[None, :]]
-    return np.ascontiguousarray(np.diff(np.diff(corners, axis=1), axis=2))
+@njit(cache=True)
+def column_profile(table, rows, columns, axis):  # type: ignore[no-untyped-def]
+    """Material below each position along a direction, in each column of cells of the other two.
+
+    Compiled: thousands of grids are ranked by it, and NumPy's two differences of a gathered view
+    take ten times as long.
+
+    Parameters
+    ----------
+    table : (x, y, z) int32 array
+        From :func:`fabfold.solid.scan.summed_volume`.
+    rows, columns : (r,) and (c,) int64 array
+        Planes of the other two directions, in subvoxels.
+    axis : int
+        0, 1 or 2: the direction.
+
+    Returns
+    -------
+    (n, r - 1, c - 1) int32 array
+        Subvoxels of material.
+    """
+    first = 1 if axis == 0 else 0
+    second = 1 if axis == 2 else 2
+    height, wide, deep = table.shape[axis], table.shape[first], table.shape[second]
+    corners = np.empty((len(rows), len(columns)), table.dtype)
+    profile = np.empty((height, len(rows) - 1, len(columns) - 1), table.dtype)
+    for at in range(height):
+        for j in range(len(rows)):
+            row = min(max(rows[j], 0), wide - 1)
+            for k in range(len(columns)):
+                column = min(max(columns[k], 0), deep - 1)
+                if axis == 0:
+                    corners[j, k] = table[at, row, column]
+                elif axis == 1:
+                    corners[j, k] = table[row, at, column]
+                else:
+                    corners[j, k] = table[row, column, at]
+        for j in range(len(rows) - 1):
+            for k in range(len(columns) - 1):
+                profile[at, j, k] = (
+                    corners[j + 1, k + 1] - corners[j, k + 1] - corners[j + 1, k] + corners[j, k]
+                )
+    return profile
+
+
+@njit(cache=True)
+def _sum_of_energies(counts, sizes, energy):  # type: ignore[no-untyped-def]
+    """Energy of all cells that have material."""
+    total = 0.0
+    for i in range(len(counts)):
+        if counts[i] > 0:
+            total += cell_energy(counts[i] / sizes[i], energy[0], energy[1], energy[2], energy[3])
+    return total
 
 
 def best_axis_offsets(
@@ -220,10 +265,10 @@ def best_axis_offsets(
         Of all cells, the cost of this direction's moves included.
     """
     moved = (regular[0] + offsets[0], regular[1] + offsets[1], regular[2] + offsets[2])
-    others = [other for other in range(3) if other != axis]
-    area = np.outer(np.diff(moved[others[0]]), np.diff(moved[others[1]])).astype(np.float64)
+    rows, columns = (moved[other] for other in range(3) if other != axis)
+    area = (rows[1:] - rows[:-1])[:, None] * (columns[1:] - columns[:-1])[None].astype(np.float64)
     found, value = _best_offsets(
-        _profile(table, moved, axis),
+        column_profile(table, rows, columns, axis),
         regular[axis],
         area,
         limit,
@@ -266,8 +311,7 @@ def optimise_offsets(
     counts = box_counts(table, regular)
     widths = [np.diff(planes).astype(float) for planes in regular]
     size = widths[0][:, None, None] * widths[1][None, :, None] * widths[2][None, None, :]
-    arguments = energy.arguments()
-    start = sum(cell_energy(float(fill), *arguments) for fill in (counts / size)[counts > 0])
+    start = _sum_of_energies(counts.ravel(), size.ravel(), energy.arguments())
     energies = [float(start)]
     for _ in range(sweeps if limit > 0 else 0):
         before = energies[-1]
