@@ -47,7 +47,7 @@ def hinge(built: BuiltTree) -> None:
     """One hinge cut open along its axis: bores, pin, web, and the way in."""
     joinery, tree = built.joinery, built.planned.tree
     pin = next(p for p in joinery.pins if abs(p.tail_mm[2] - p.tip_mm[2]) > 1.0)
-    hinged = tree.hinges[pin.hinges[0]]
+    hinged = tree.hinges[pin.hinge]
     middle = (np.array(pin.tip_mm) + np.array(pin.tail_mm)) / 2
     colours = body_colours(tree)
     # What lies before the plane through the axis is taken away; the rest is cropped to a block.

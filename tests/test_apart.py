@@ -85,7 +85,7 @@ def test_bores_grip_and_slip_by_what_the_profile_says(made):
     assert len(joinery.pins) == len(tree.hinges)
     for pin in joinery.pins:
         assert pin.length_mm == pytest.approx(20.0 - 2 * (2.5 + 0.3) - 0.8 - 0.2, abs=1e-6)
-        (hinge,) = (tree.hinges[h] for h in pin.hinges)
+        hinge = tree.hinges[pin.hinge]
         bare = replace(joinery, pins=())
         rod = replace(joinery, pins=(pin,))
         alone = meshes_with_pins(rod)[pin.owner]
@@ -169,7 +169,7 @@ def test_the_replay_finds_a_pin_from_the_closed_end_and_a_side_from_below(made):
     closed = [replace(first, end=-first.end), *kit.steps[1:]]
     seen = replay_assembly(tree, joinery, bores, closed)
     assert seen.done == len(kit.steps) - 1
-    assert f"{tree.hinges[bores[first.pin].hinges[0]].name}: body-" in seen.faults[0]
+    assert f"{tree.hinges[bores[first.pin].hinge].name}: body-" in seen.faults[0]
     assert "in the way of the pin" in seen.faults[0]
     # Along the axis the knuckles of one side run into those of the other.
     x, y, z = bores[first.pin].axis.tolist()
@@ -392,3 +392,29 @@ def test_the_urdf_folds_in_mujoco_as_the_kit_does(kit_folder):
         assert np.allclose(data.body(name).xmat.reshape(3, 3), pose[:3, :3], atol=1e-6)
         there = 1000.0 * data.body(name).xpos
         assert np.allclose(there, pose[:3, :3] @ point + pose[:3, 3], atol=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("sides", "turns"), [((0, 1), (1, 1)), ((0, 2), (1, 3)), ((2, 1), (3, 3))])
+def test_double_hinges_have_a_pin_an_axis_and_go_together(sides, turns):
+    from double_models import full_solid, hand_tree, motion_of, planned
+    from joinery_models import voxels_of
+
+    tree = hand_tree([[0, 0, 0], [1, 0, 0]], [(0, 1, ("D", sides, turns))])
+    motion = motion_of(tree, planned(tree))
+    joinery = build_bodies(
+        voxels_of(tree.source, full_solid(tree)),
+        tree,
+        motion,
+        voxel_mm=20.0,
+        clearance_mm=FIT.clearance_mm,
+        face_gap_mm=FIT.face_gap_mm,
+        pin=print_mode(PLA).loose_pin(),
+    )
+    joinery, kit = prepare_apart(tree, motion, joinery, PLA, SilentProgress())
+    assert len(joinery.pins) == 2
+    assert {pin.owner for pin in joinery.pins} == {0, 2}  # the link turns on both
+    seen = replay_assembly(tree, joinery, pin_bores(tree, joinery), kit.steps)
+    assert (seen.done, seen.faults) == (2, ())
+    proof = certify(tree, motion, meshes_with_pins(joinery), 20.0, joinery.origin_mm, 0.1)
+    assert proof["min_gap_mm"] >= 0.1

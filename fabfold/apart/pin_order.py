@@ -162,7 +162,7 @@ def find_order(
             continue
         found = search.next_pin(whole, pins, pose)
         if found is None:
-            names = ", ".join(tree.hinges[h].name for i in pins for h in bores[i].hinges)
+            names = ", ".join(tree.hinges[bores[pin].hinge].name for pin in pins)
             raise GeometryError(f"no order of assembly: no pin of {names} can be pushed in")
         step, pose = found
         steps.append(step)
@@ -249,7 +249,7 @@ class _Disassembly:
 
     def _sides(self, whole: frozenset[int], pin: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """The two parts that a pin holds together, the larger first."""
-        cut = set(self._bores[pin].hinges)
+        cut = self._bores[pin].hinge
         parent = {body: body for body in whole}
 
         def root(body: int) -> int:
@@ -258,15 +258,14 @@ class _Disassembly:
             return body
 
         for index, hinge in enumerate(self._tree.hinges):
-            if index not in cut and hinge.parent in whole and hinge.child in whole:
+            if index != cut and hinge.parent in whole and hinge.child in whole:
                 parent[root(hinge.parent)] = root(hinge.child)
         parts: dict[int, list[int]] = {}
         for body in sorted(whole):
             parts.setdefault(root(body), []).append(body)
         ordered = sorted(parts.values(), key=lambda part: (-len(part), part))
-        # Both axes of a double hinge on one edge: the link stays with the part that rests.
-        rests = [body for part in ordered[:1] + ordered[2:] for body in part]
-        return tuple(rests), tuple(ordered[1])
+        rests, comes = ordered
+        return tuple(rests), tuple(comes)
 
     def _smaller_side(self, whole: frozenset[int], pin: int) -> int:
         return len(self._sides(whole, pin)[1])

@@ -85,7 +85,7 @@ def replay_assembly(
     faults, looks = [], 0
     for step in steps:
         bore, pin = bores[step.pin], joinery.pins[step.pin]
-        name = " and ".join(tree.hinges[h].name for h in bore.hinges)
+        name = tree.hinges[bore.hinge].name
         poses = poses_in_mm(tree, joinery, np.array(step.angles_deg))
         meshes = list(bare)
         for body, mesh in enumerate(_with_some(joinery, placed)):

@@ -154,15 +154,14 @@ def assembly_data(tree: FoldTree, joinery: Joinery, kit: ApartKit) -> dict[str, 
     steps = []
     for step in kit.steps:
         pin = joinery.pins[step.pin]
-        there = {h.name for h in tree.hinges}
         inside = set(step.sides[0]) | set(step.sides[1])
         steps.append(
             {
-                "hinges": [tree.hinges[h].name for h in pin.hinges],
+                "hinge": tree.hinges[pin.hinge].name,
                 "angles_deg": {
                     hinge.name: angle
                     for hinge, angle in zip(tree.hinges, step.angles_deg, strict=True)
-                    if hinge.name in there and hinge.parent in inside and hinge.child in inside
+                    if hinge.parent in inside and hinge.child in inside
                 },
                 "rests": [names[body] for body in step.sides[0]],
                 "comes": [names[body] for body in step.sides[1]],

@@ -43,8 +43,8 @@ class PlacedPin:
 
     Attributes
     ----------
-    hinges : tuple of int
-        Indices of the hinges that turn on it.
+    hinge : int
+        Index of the hinge that turns on it.
     owner : int
         Index of the body that grips it.
     tip_mm : (3,) tuple of float
@@ -55,7 +55,7 @@ class PlacedPin:
         Diameter, mm.
     """
 
-    hinges: tuple[int, ...]
+    hinge: int
     owner: int
     tip_mm: tuple[float, float, float]
     tail_mm: tuple[float, float, float]

@@ -19,7 +19,7 @@ from fabfold.joinery.bodies import BodyMesh, Joinery, PlacedPin
 from fabfold.joinery.booleans import subtract, union
 from fabfold.joinery.cells import as_manifold
 from fabfold.joinery.soundness import printable_body
-from fabfold.tree.fold_tree import FoldTree, Hinge
+from fabfold.tree.fold_tree import FoldTree
 
 if TYPE_CHECKING:
     import manifold3d
@@ -60,9 +60,9 @@ class PinBore:
 
     Attributes
     ----------
-    hinges : tuple of int
-        Indices of its hinges: one, or both of a double hinge on one edge.
-    bodies : tuple of int
+    hinge : int
+        Index of the hinge.
+    bodies : (int, int)
         Indices of the bodies that have knuckles here.
     owner : int
         Index of the body that grips the pin; the outer knuckles are its.
@@ -74,8 +74,8 @@ class PinBore:
         Half of the length of the barrel, mm.
     """
 
-    hinges: tuple[int, ...]
-    bodies: tuple[int, ...]
+    hinge: int
+    bodies: tuple[int, int]
     owner: int
     middle: Floats
     axis: Floats
@@ -87,7 +87,7 @@ class PinBore:
 
 
 def pin_bores(tree: FoldTree, joinery: Joinery) -> list[PinBore]:
-    """Every line of knuckles of a kit, in the order of their first hinges.
+    """Every line of knuckles of a kit, in the order of the hinges.
 
     Parameters
     ----------
@@ -99,43 +99,37 @@ def pin_bores(tree: FoldTree, joinery: Joinery) -> list[PinBore]:
     Returns
     -------
     list of PinBore
-        One for each pin.
+        One for each hinge.
+
+    Raises
+    ------
+    GeometryError
+        If both axes of a double hinge lie on one edge.
     """
     reach = joinery.barrel_radius_mm + joinery.clearance_mm
     origin = np.asarray(joinery.origin_mm)
     found = []
     for edge in tree.edges:
-        if not edge.hinges:
-            continue
-        hinges = [tree.hinges[h] for h in edge.hinges]
-        groups = [tuple(edge.hinges)] if _one_line(hinges) else [(h,) for h in edge.hinges]
-        for place, group in enumerate(groups):
-            first, last = tree.hinges[group[0]], tree.hinges[group[-1]]
-            bodies: tuple[int, ...]
-            if len(group) == 2:
-                bodies, owner = (first.parent, first.child, last.child), first.child
-            else:
-                # The second axis of a double hinge is laid out from the child's side.
-                bodies = (first.parent, first.child)
-                owner = first.child if place == 1 else first.parent
-            axis = np.asarray(first.direction, dtype=float)
+        if len({tree.hinges[h].point for h in edge.hinges}) < len(edge.hinges):
+            raise GeometryError(
+                f"{' and '.join(tree.hinges[h].name for h in edge.hinges)}: both axes lie on one "
+                "edge, and one loose pin does not hold three bodies"
+            )
+        for place, index in enumerate(edge.hinges):
+            hinge = tree.hinges[index]
+            axis = np.asarray(hinge.direction, dtype=float)
             found.append(
                 PinBore(
-                    group,
-                    bodies,
-                    owner,
-                    origin + joinery.voxel_mm * np.asarray(first.point, dtype=float),
+                    index,
+                    (hinge.parent, hinge.child),
+                    # The second axis of a double hinge is laid out from the child's side.
+                    hinge.child if place == 1 else hinge.parent,
+                    origin + joinery.voxel_mm * np.asarray(hinge.point, dtype=float),
                     axis / np.linalg.norm(axis),
                     joinery.voxel_mm / 2 - reach,
                 )
             )
-    return sorted(found, key=lambda bore: bore.hinges[0])
-
-
-def _one_line(hinges: Sequence[Hinge]) -> bool:
-    """Whether both axes of a double hinge lie on one edge."""
-    points = np.array([hinge.point for hinge in hinges], dtype=float)
-    return bool(np.ptp(points, axis=0).max() < 1e-6)
+    return sorted(found, key=lambda bore: bore.hinge)
 
 
 def cylinder_between(
@@ -288,7 +282,7 @@ def with_pins(
         tip, tail = inside, bore.face(end) - end * _SHORT_MM * bore.axis
         pins.append(
             PlacedPin(
-                bore.hinges,
+                bore.hinge,
                 bore.owner,
                 _triple(tip),
                 _triple(tail),
