@@ -418,3 +418,17 @@ def test_double_hinges_have_a_pin_an_axis_and_go_together(sides, turns):
     assert (seen.done, seen.faults) == (2, ())
     proof = certify(tree, motion, meshes_with_pins(joinery), 20.0, joinery.origin_mm, 0.1)
     assert proof["min_gap_mm"] >= 0.1
+
+
+def test_every_3mf_shows_a_picture(kit_folder):
+    import io
+
+    from PIL import Image
+
+    _, folder = kit_folder
+    for file in ("plate-1.3mf", "bar.3mf", "bar-bambu.3mf"):
+        with zipfile.ZipFile(folder / file) as package:
+            (name,) = (n for n in package.namelist() if n.lower().endswith(".png"))
+            image = Image.open(io.BytesIO(package.read(name)))
+        assert image.size == (256, 256)
+        assert len(image.getcolors(256 * 256)) > 100

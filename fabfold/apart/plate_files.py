@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fabfold.apart.apart_kit import ApartKit
 from fabfold.apart.plates import Plates, on_plate
 from fabfold.export.bambu import BAMBU, bambu_plates, bambu_project
+from fabfold.export.render import thumbnail
 from fabfold.export.threemf import write_3mf
 from fabfold.files import write_json, write_text
 from fabfold.joinery.bodies import Joinery
@@ -61,9 +62,11 @@ def write_plates(
     remove_plates(folder, keep=plates.count)
     for index in range(plates.count):
         on = plates.plate == index
+        bodies = on_plate(joinery, plates, index)
         write_3mf(
             folder / f"plate-{index + 1}.3mf",
-            on_plate(joinery, plates, index),
+            bodies,
+            thumbnail=thumbnail([(b.vertices, b.faces) for b in bodies.bodies], colours[on]),
             title=f"{name}, plate {index + 1} of {plates.count}",
             metadata=metadata,
             colours=colours[on],
@@ -71,11 +74,13 @@ def write_plates(
             keep_place=True,
         )
     spread = _side_by_side(joinery, plates)
+    picture = thumbnail([(b.vertices, b.faces) for b in spread.bodies], colours)
     names = [body.name for body in joinery.bodies]
     write_3mf(
         folder / f"{name}.3mf",
         spread,
         title=f"{name}, all plates",
+        thumbnail=picture,
         metadata=metadata,
         colours=colours,
         layout="apart",
@@ -85,6 +90,7 @@ def write_plates(
         folder / f"{name}-bambu.3mf",
         spread,
         title=name,
+        thumbnail=picture,
         metadata={**metadata, "Application": BAMBU},
         colours=colours,
         layout="apart",

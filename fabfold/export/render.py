@@ -19,7 +19,7 @@ from fabfold.export.lighting import ShadowFloor, light_at, sun_frame
 from fabfold.export.shading import corner_normals
 from fabfold.srgb import bytes_of_light, linear_light
 
-__all__ = ["Image", "Mesh", "png_bytes", "render"]
+__all__ = ["Image", "Mesh", "png_bytes", "render", "thumbnail"]
 
 #: A picture, (height, width, 3) uint8 array, sRGB.
 Image = NDArray[np.uint8]
@@ -167,6 +167,25 @@ def _painted(
     lit = paint * (light + bounce)[:, None] + (shine * np.clip(light, 0, 1))[:, None]
     # A soft shoulder, so that bright colours keep their hue.
     return np.asarray(np.where(lit > 0.8, 0.8 + 0.2 * np.tanh((lit - 0.8) / 0.2), lit))
+
+
+def thumbnail(meshes: Sequence[Mesh], colours: NDArray[np.uint8]) -> bytes:
+    """A small picture for file managers and slicers, as PNG.
+
+    Parameters
+    ----------
+    meshes : sequence of ((v, 3) float array, (f, 3) int32 array)
+        Vertices and triangles of each mesh.
+    colours : (b, 3) uint8 array
+        Colour of each mesh, sRGB.
+
+    Returns
+    -------
+    bytes
+        256 × 256 pixels.
+    """
+    view = View(size=(256, 256), lights=8)
+    return png_bytes(render(meshes, colours, None, view))
 
 
 def png_bytes(image: Image) -> bytes:

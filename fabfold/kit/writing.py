@@ -11,7 +11,7 @@ from fabfold.export.colours import body_colours
 from fabfold.export.flat import flat_poses
 from fabfold.export.glb import write_glb
 from fabfold.export.kit_picture import write_strip
-from fabfold.export.render import png_bytes
+from fabfold.export.render import png_bytes, thumbnail
 from fabfold.export.report import write_report
 from fabfold.export.sketch import picture_of_tree
 from fabfold.export.stl import write_stl
@@ -250,7 +250,15 @@ def write_printable(folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltT
     else:
         remove_plates(folder)
         title = f"{name} folds into {tree.template.name}"
-        write_3mf(folder / f"{name}.3mf", joinery, title=title, metadata=metadata, colours=colours)
+        picture = thumbnail([(body.vertices, body.faces) for body in joinery.bodies], colours)
+        write_3mf(
+            folder / f"{name}.3mf",
+            joinery,
+            title=title,
+            metadata=metadata,
+            colours=colours,
+            thumbnail=picture,
+        )
         write_3mf(
             folder / f"{name}-bambu.3mf",
             joinery,
@@ -258,6 +266,7 @@ def write_printable(folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltT
             metadata={**metadata, "Application": BAMBU},
             colours=colours,
             layout="assembly",
+            thumbnail=picture,
         )
     if built.retention is not None:
         write_json(folder / "retention.json", _retention_data(built, built.retention))
