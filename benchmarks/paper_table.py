@@ -116,7 +116,7 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
     lines += [
         "",
         "Processor seconds by stage; by the clock, when the first kit that folds was on disk, and",
-        "when everything was.",
+        "when everything was, whatever else the machine was doing.",
         "",
         "| model | " + " | ".join(STAGES) + " | all | first kit, clock | all, clock | peak MiB |"
         " paper core-h |",
