@@ -15,7 +15,7 @@ from distributed import LocalCluster
 
 from fabfold import Kit
 
-SEEDS = (1, 2, 3)
+SEEDS = (1, 2)
 
 
 def main(folder: str = "seeds") -> None:

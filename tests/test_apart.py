@@ -278,6 +278,7 @@ def kit_folder(bar_kit, bar, bar_options, tmp_path_factory):
     return kit, folder
 
 
+@pytest.mark.slow
 def test_the_kit_passes_and_its_files_agree(kit_folder):
     kit, folder = kit_folder
     report = json.loads((folder / "report.json").read_text("utf-8"))
@@ -295,6 +296,7 @@ def test_the_kit_passes_and_its_files_agree(kit_folder):
     assert pins == report["summary"]["pins"]
 
 
+@pytest.mark.slow
 def test_plates_hold_every_body_by_name_and_bambu_finds_its_plates(kit_folder):
     import lib3mf
 
@@ -334,6 +336,7 @@ def test_plates_hold_every_body_by_name_and_bambu_finds_its_plates(kit_folder):
     assert told["Application"].startswith("BambuStudio-")
 
 
+@pytest.mark.slow
 def test_a_kit_comes_back_from_its_folder(kit_folder):
     kit, _ = kit_folder
     built = kit.join()
@@ -370,6 +373,7 @@ def test_printed_in_place_again_the_plates_go(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bar-bambu.3mf", "plate-x.3mf"]
 
 
+@pytest.mark.slow
 def test_the_urdf_folds_in_mujoco_as_the_kit_does(kit_folder):
     import mujoco
 
@@ -420,6 +424,7 @@ def test_double_hinges_have_a_pin_an_axis_and_go_together(sides, turns):
     assert proof["min_gap_mm"] >= 0.1
 
 
+@pytest.mark.slow
 def test_every_3mf_shows_a_picture(kit_folder):
     import io
 

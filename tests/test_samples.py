@@ -41,13 +41,8 @@ def test_templates_of_the_classics() -> None:
     assert sample("elephant").template == "box-4x4x4"
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        name if name == "duck" else pytest.param(name, marks=pytest.mark.slow)
-        for name in sample_names()
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sample_names())
 def test_mesh_is_the_drawn_solid(name: str) -> None:
     import manifold3d
 

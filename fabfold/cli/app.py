@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fabfold.cli.options import (
+from fabfold.cli.command_options import (
     BoxMm,
     ClearanceMm,
     Closed,

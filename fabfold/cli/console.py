@@ -129,6 +129,11 @@ def show_result(kit: Kit, stage: str) -> None:
         for name, seconds in kit.processor_seconds.items()
         if seconds >= 0.1
     }
+    compiling = kit.kernel_seconds
+    if compiling >= 0.1 and "searching" in spent:
+        # The kernels are waited for when the search begins.
+        spent = {"compiling, once": compiling, **spent}
+        spent["searching"] -= compiling
     if spent:
         each = ", ".join(f"{name} {seconds:.1f}" for name, seconds in spent.items())
         console.print(f"processor seconds: {each}; {processor_seconds():.1f} with the start")

@@ -26,7 +26,7 @@ from fabfold.tree.fold_tree import FoldTree
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["MAGNETS", "Magnet", "MagnetPair", "Retention", "free_hinges", "hold_shut"]
+__all__ = ["MAGNETS", "DiscMagnet", "MagnetPair", "Retention", "free_hinges", "hold_shut"]
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ _STILL = 1e-6
 
 
 @dataclass(frozen=True)
-class Magnet:
+class DiscMagnet:
     """A disc magnet.
 
     Attributes
@@ -59,9 +59,13 @@ class Magnet:
     thick_mm: float
 
 
-MAGNETS: Final[dict[str, Magnet]] = {
+MAGNETS: Final[dict[str, DiscMagnet]] = {
     magnet.name: magnet
-    for magnet in (Magnet("3x1", 3.0, 1.0), Magnet("4x2", 4.0, 2.0), Magnet("5x2", 5.0, 2.0))
+    for magnet in (
+        DiscMagnet("3x1", 3.0, 1.0),
+        DiscMagnet("4x2", 4.0, 2.0),
+        DiscMagnet("5x2", 5.0, 2.0),
+    )
 }
 """Magnets that kits can be made with, by name."""
 
@@ -144,7 +148,7 @@ class _Meeting:
 
 
 def hold_shut(
-    tree: FoldTree, motion: Motion, joinery: Joinery, magnet: Magnet
+    tree: FoldTree, motion: Motion, joinery: Joinery, magnet: DiscMagnet
 ) -> tuple[Joinery, Retention]:
     """Choose pairs of magnets and cut their pockets.
 
@@ -156,7 +160,7 @@ def hold_shut(
         The folding path; its end is the box.
     joinery : Joinery
         The printed bodies.
-    magnet : Magnet
+    magnet : DiscMagnet
         What is to be put in.
 
     Returns
@@ -376,7 +380,7 @@ def _places(
     joinery: Joinery,
     solids: Sequence[manifold3d.Manifold],
     poses: Floats,
-    magnet: Magnet,
+    magnet: DiscMagnet,
 ) -> list[tuple[MagnetPair, Floats]]:
     """The first place on a meeting with room for a pocket and its wall on both sides."""
     u, v = _across(meeting.normal)
@@ -409,7 +413,7 @@ def _with_pockets(
     joinery: Joinery,
     solids: Sequence[manifold3d.Manifold],
     pairs: Sequence[MagnetPair],
-    magnet: Magnet,
+    magnet: DiscMagnet,
 ) -> Joinery:
     """The bodies with a pocket for every magnet."""
     tools: dict[int, list[manifold3d.Manifold]] = {}

@@ -309,6 +309,11 @@ class Kit(StageRunner):
             load_profile(recipe.profile), recipe.print, recipe.pin, recipe.clearance_mm, magnet
         )
 
+    @property
+    def kernel_seconds(self) -> float:
+        """Processor seconds that compiling the search's kernels took; part of the fit stage's."""
+        return 0.0 if self._compiler is None else self._compiler.processor_seconds
+
     def profile(self) -> Profile:
         """Printer profile, with the gaps of the way in which the kit is printed."""
         return self.print_mode().profile

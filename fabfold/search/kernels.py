@@ -53,6 +53,11 @@ def kernel_stamp() -> Path:
 class KernelCompiler:
     """Processes that compile what is missing; none where everything is there.
 
+    Attributes
+    ----------
+    processor_seconds : float
+        What it has cost, once it was waited for.
+
     Examples
     --------
     >>> compiler = KernelCompiler()
@@ -63,6 +68,7 @@ class KernelCompiler:
     def __init__(self) -> None:
         self._stamp = kernel_stamp()
         self._running: list[subprocess.Popen[bytes]] = []
+        self.processor_seconds = 0.0
 
     def start(self) -> None:
         """Begin, unless the kernels are there or it has begun already."""
@@ -91,6 +97,7 @@ class KernelCompiler:
         """
         if not self._running:
             return
+        before = _children_seconds()
         try:
             while any(process.poll() is None for process in self._running):
                 done = sum(process.poll() is not None for process in self._running)
@@ -104,6 +111,7 @@ class KernelCompiler:
                 self._write_stamp()
         finally:
             self.close()
+            self.processor_seconds += _children_seconds() - before
 
     def close(self) -> None:
         """End what still runs."""
@@ -122,6 +130,12 @@ class KernelCompiler:
             self._stamp.touch()
         except OSError:
             return  # Then the next run looks again; that costs it some seconds.
+
+
+def _children_seconds() -> float:
+    """Processor seconds of processes that have ended and were waited for."""
+    spent = os.times()
+    return spent.children_user + spent.children_system
 
 
 def compile_half(half: str) -> None:
