@@ -17,6 +17,7 @@ STAND_INS = {
     ', effort="quick"': "",
     'from_model("sample:car"': 'from_model("bar.stl", template="box-2x2x2", effort="quick"',
     'load_template("box-4x4x4")': 'load_template("box-2x2x2")',
+    "size=(1600, 1200), samples=3": "size=(320, 240)",
     'seconds=60, scheduler="tcp://host:8786"': "seconds=0",
 }
 WITH_EXAMPLES = sorted(
