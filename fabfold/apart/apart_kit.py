@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from fabfold.apart.pin_order import AssemblyStep, find_order
+from fabfold.apart.pin_replay import replay_assembly
 from fabfold.apart.plates import Plates, lay_out_plates
+from fabfold.errors import GeometryError
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.loose_pins import pin_bores, with_pins
@@ -86,5 +88,9 @@ def prepare_apart(
     joinery = with_pins(
         joinery, bores, [ends[i] for i in range(len(bores))], fit.grip_mm, fit.slip_mm
     )
+    # The search looks along a grid of lines; what is finer shows when it is played through.
+    seen = replay_assembly(tree, joinery, bores, steps)
+    if seen.done < seen.pins:
+        raise GeometryError(f"no order of assembly: {seen.faults[0]}")
     progress.update(None, "plates")
     return joinery, ApartKit(tuple(steps), lay_out_plates(joinery, bores, profile))
