@@ -155,7 +155,7 @@ def test_every_pin_is_put_in_once_and_parts_grow_together(made):
 
 def test_the_replay_with_real_pins_agrees(made):
     tree, _, joinery, kit = made
-    checks = {check.name: check for check in check_apart(tree, joinery, kit)}
+    checks = {check.name: check for check in check_apart(joinery, kit)}
     pins = checks["pins that can be pushed in"]
     assert pins.ok
     assert pins.figure == pins.limit == len(tree.hinges)
@@ -437,3 +437,21 @@ def test_every_3mf_shows_a_picture(kit_folder):
             image = Image.open(io.BytesIO(package.read(name)))
         assert image.size == (256, 256)
         assert len(image.getcolors(256 * 256)) > 100
+
+
+def test_a_kit_that_does_not_go_together_fails_its_check_and_says_where(made):
+    tree, _, joinery, kit = made
+    bores = pin_bores(tree, joinery)
+    first = kit.steps[0]
+    seen = replay_assembly(tree, joinery, bores, [replace(first, end=-first.end), *kit.steps[1:]])
+    checks = {check.name: check for check in check_apart(joinery, replace(kit, replay=seen))}
+    pins = checks["pins that can be pushed in"]
+    assert not pins.ok
+    assert (pins.figure, pins.limit) == (len(kit.steps) - 1, len(kit.steps))
+    assert "in the way of the pin" in pins.note
+
+
+def test_what_was_seen_comes_back_with_the_kit(kit_folder):
+    built = kit_folder[0].join()
+    again = load_built(kit_folder[0]._store, save_built(kit_folder[0]._store, built))
+    assert again.apart.replay == built.apart.replay

@@ -5,26 +5,17 @@ from dataclasses import replace
 
 import pytest
 import trimesh
+from stage_listener import StageListener
 
 from fabfold.kit.early import EarlyKit
 from fabfold.progress import SilentListener
 
 
-class Listener(SilentListener):
+class Listener(StageListener):
     """Keeps the last message of each stage."""
 
     def __init__(self):
         self.told = {}
-
-    def stage(self, name):
-        self.name = name
-        return self
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        return None
 
     def update(self, share, message=""):
         self.told[self.name] = message

@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 import trimesh
+from stage_listener import StageListener
 
 from fabfold.errors import NoFoldError
 from fabfold.files import write_json
@@ -30,18 +31,8 @@ def content(kit):
     return [json.loads(data) for data in seeds_of(kit).values()]
 
 
-class StopAtBetter:
+class StopAtBetter(StageListener):
     """Interrupts the search once a better tree is known while a seed runs."""
-
-    def stage(self, name):
-        self.name = name
-        return self
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        return None
 
     def update(self, share, message=""):
         if self.name.startswith("fit") and "best" in message:

@@ -3,37 +3,32 @@
 from __future__ import annotations
 
 from fabfold.apart.apart_kit import ApartKit
-from fabfold.apart.pin_replay import replay_assembly
 from fabfold.joinery.bodies import Joinery
-from fabfold.joinery.loose_pins import pin_bores
 from fabfold.printing.checks import Check
-from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["check_apart"]
 
 
-def check_apart(tree: FoldTree, joinery: Joinery, kit: ApartKit) -> list[Check]:
-    """Put the kit together with its real pins, and tell how its bodies lie on their plates.
+def check_apart(joinery: Joinery, kit: ApartKit) -> list[Check]:
+    """Tell how the kit went together with its real pins, and how its bodies lie on their plates.
 
     Parameters
     ----------
-    tree : FoldTree
-        The bodies and their hinges.
     joinery : Joinery
         The bodies as they are printed, with their pins.
     kit : ApartKit
-        Order and plates.
+        Order, plates, and what was seen when the order was played through. Pockets for magnets,
+        which are cut later, only take away.
 
     Returns
     -------
     list of Check
         Pins that can be pushed in, and two figures for information.
     """
-    seen = replay_assembly(tree, joinery, pin_bores(tree, joinery), kit.steps)
+    seen = kit.replay
     names = [body.name for body in joinery.bodies]
-    laid = kit.plates.laid
-    propped = [names[entry.body] for entry in laid if entry.supported]
-    leaning = [names[entry.body] for entry in laid if entry.topples and not entry.supported]
+    propped = [names[body] for body in kit.plates.supported]
+    leaning = [names[body] for body in kit.plates.leaning]
     bed = " × ".join(f"{size:g}" for size in kit.plates.bed_mm)
     return [
         Check(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from fabfold.apart.pin_order import AssemblyStep, find_order
-from fabfold.apart.pin_replay import replay_assembly
+from fabfold.apart.pin_replay import PinReplay, replay_assembly
 from fabfold.apart.plates import Plates, lay_out_plates
 from fabfold.errors import GeometryError
 from fabfold.fold.motion import Motion
@@ -29,23 +29,28 @@ class ApartKit:
         The order in which it is put together.
     plates : Plates
         How the bodies are printed.
+    replay : PinReplay
+        What was seen when the order was played through.
     """
 
     steps: tuple[AssemblyStep, ...]
     plates: Plates
+    replay: PinReplay
 
     def to_json(self) -> dict[str, Any]:
         """Ready for a JSON file."""
         return {
             "steps": [step.to_json() for step in self.steps],
             "plates": self.plates.to_json(),
+            "replay": asdict(self.replay),
         }
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> ApartKit:
         """A kit from what :meth:`to_json` wrote."""
         steps = tuple(AssemblyStep.from_json(step) for step in data["steps"])
-        return cls(steps, Plates.from_json(data["plates"]))
+        seen = {**data["replay"], "faults": tuple(data["replay"]["faults"])}
+        return cls(steps, Plates.from_json(data["plates"]), PinReplay(**seen))
 
 
 def prepare_apart(
@@ -93,4 +98,4 @@ def prepare_apart(
     if seen.done < seen.pins:
         raise GeometryError(f"no order of assembly: {seen.faults[0]}")
     progress.update(None, "plates")
-    return joinery, ApartKit(tuple(steps), lay_out_plates(joinery, bores, profile))
+    return joinery, ApartKit(tuple(steps), lay_out_plates(joinery, bores, profile), seen)

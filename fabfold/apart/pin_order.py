@@ -20,12 +20,12 @@ from fabfold.export.raster import fill_depth
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.body_poses import poses_in_mm
+from fabfold.joinery.cells import solids_of
 from fabfold.joinery.loose_pins import (
     PinBore,
     barrel_around,
     entry_channel,
     pin_rod,
-    solids_of,
 )
 from fabfold.progress import Progress
 from fabfold.tree.fold_tree import FoldTree
@@ -184,7 +184,7 @@ class _Disassembly:
     ) -> None:
         self._tree, self._joinery, self._bores = tree, joinery, bores
         self._angles = poses_to_try(motion)
-        self._solids = solids_of(joinery)
+        self._solids = solids_of(joinery.bodies)
         self._placed: dict[int, Floats] = {}
         self._posed: dict[tuple[int, int], manifold3d.Manifold] = {}
         self._rods = [

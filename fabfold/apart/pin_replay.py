@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from fabfold.apart.pin_order import AssemblyStep
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.joinery.booleans import evaluated
-from fabfold.joinery.cells import as_manifold
+from fabfold.joinery.cells import solids_of
 from fabfold.joinery.loose_pins import PinBore, meshes_with_pins, pin_rod
 from fabfold.tree.fold_tree import FoldTree
 
@@ -79,22 +79,19 @@ def replay_assembly(
     """
     import fcl
 
-    bare = [(body.vertices, body.faces) for body in joinery.bodies]
-    solids = [as_manifold(body.vertices, body.faces, body.name) for body in joinery.bodies]
+    solids = solids_of(joinery.bodies)
     placed: list[int] = []
     faults, looks = [], 0
     for step in steps:
         bore, pin = bores[step.pin], joinery.pins[step.pin]
         name = tree.hinges[bore.hinge].name
         poses = poses_in_mm(tree, joinery, np.array(step.angles_deg))
-        meshes = list(bare)
-        for body, mesh in enumerate(_with_some(joinery, placed)):
-            meshes[body] = mesh
+        there = replace(joinery, pins=tuple(joinery.pins[i] for i in placed))
+        meshes = meshes_with_pins(there)
         rests, comes = (
             [_object(fcl, meshes[body], poses[body]) for body in side] for side in step.sides
         )
-        boxes = [_box(meshes, poses, side) for side in step.sides]
-        far = _way_out(boxes[0], boxes[1], np.array(step.away))
+        far = _way_out(_around(rests), _around(comes), np.array(step.away))
         hit = None
         for count in range(int(np.ceil(far / STEP_MM)), -1, -1):
             looks += 1
@@ -107,7 +104,7 @@ def replay_assembly(
                     f"{name}: {other} meets {one} {STEP_MM * count:.1f} mm before its place"
                 )
                 break
-        blocking = _in_the_way(tree, joinery, solids, bore, step, pin.diameter_mm / 2, poses)
+        blocking = _in_the_way(joinery, solids, bore, step, pin.diameter_mm / 2, poses)
         if hit is None and blocking:
             faults.append(f"{name}: {blocking} is in the way of the pin")
         placed.append(step.pin)
@@ -117,28 +114,20 @@ def replay_assembly(
     return PinReplay(len(joinery.pins) - len(faults), len(joinery.pins), looks, tuple(faults))
 
 
-def _with_some(joinery: Joinery, pins: Sequence[int]) -> list[tuple[Floats, NDArray[np.int32]]]:
-    from dataclasses import replace
-
-    return meshes_with_pins(replace(joinery, pins=tuple(joinery.pins[i] for i in pins)))
-
-
 def _object(fcl: Any, mesh: tuple[Floats, NDArray[np.int32]], pose: Floats) -> tuple[Any, Floats]:
     vertices, faces = mesh
     model = fcl.BVHModel()
     model.beginModel(len(vertices), len(faces))
-    model.addSubModel(vertices @ pose[:3, :3].T + pose[:3, 3], faces)
-    model.endModel()
     points = vertices @ pose[:3, :3].T + pose[:3, 3]
+    model.addSubModel(points, faces)
+    model.endModel()
     return fcl.CollisionObject(model), np.array([points.min(axis=0), points.max(axis=0)])
 
 
-def _box(
-    meshes: Sequence[tuple[Floats, NDArray[np.int32]]], poses: Floats, side: Sequence[int]
-) -> Floats:
-    points = [meshes[b][0] @ poses[b][:3, :3].T + poses[b][:3, 3] for b in side]
-    every = np.concatenate(points)
-    return np.array([every.min(axis=0), every.max(axis=0)])
+def _around(side: Sequence[tuple[Any, Floats]]) -> Floats:
+    """Lowest and highest corner of all bodies of a side, mm."""
+    boxes = np.array([box for _, box in side])
+    return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
 
 def _way_out(rests: Floats, comes: Floats, away: Floats) -> float:
@@ -166,7 +155,6 @@ def _collision(
 
 
 def _in_the_way(
-    tree: FoldTree,
     joinery: Joinery,
     solids: list[manifold3d.Manifold],
     bore: PinBore,

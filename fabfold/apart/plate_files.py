@@ -18,7 +18,7 @@ from fabfold.apart.apart_kit import ApartKit
 from fabfold.apart.plates import Plates, on_plate
 from fabfold.export.bambu import BAMBU, bambu_plates, bambu_project
 from fabfold.export.render import thumbnail
-from fabfold.export.threemf import write_3mf
+from fabfold.export.threemf import posed, write_3mf
 from fabfold.files import write_json, write_text
 from fabfold.joinery.bodies import Joinery
 from fabfold.printing.print_mode import PINS
@@ -131,12 +131,10 @@ def _corner(plates: Plates, index: int) -> NDArray[np.float64]:
 
 
 def _side_by_side(joinery: Joinery, plates: Plates) -> Joinery:
-    bodies = []
-    for index, (mesh, pose) in enumerate(zip(joinery.bodies, plates.poses, strict=True)):
-        moved = mesh.vertices @ pose[:3, :3].T + pose[:3, 3]
-        moved += _corner(plates, int(plates.plate[index]))
-        bodies.append(replace(mesh, vertices=moved))
-    return replace(joinery, bodies=tuple(bodies), pins=())
+    poses = plates.poses.copy()
+    for body, plate in enumerate(plates.plate.tolist()):
+        poses[body, :3, 3] += _corner(plates, plate)
+    return replace(posed(joinery, poses), pins=())
 
 
 def assembly_data(tree: FoldTree, joinery: Joinery, kit: ApartKit) -> dict[str, Any]:
@@ -185,7 +183,7 @@ def assembly_data(tree: FoldTree, joinery: Joinery, kit: ApartKit) -> dict[str, 
         "format": "fabfold-assembly",
         "version": 1,
         "steps": steps,
-        "supported": [names[entry.body] for entry in kit.plates.laid if entry.supported],
+        "supported": [names[body] for body in kit.plates.supported],
         "plates": [
             [names[body] for body in np.flatnonzero(kit.plates.plate == index)]
             for index in range(kit.plates.count)

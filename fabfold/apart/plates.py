@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import CheckError
-from fabfold.joinery.bodies import BodyMesh, Joinery
+from fabfold.export.threemf import posed
+from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.loose_pins import PinBore
 from fabfold.lattice.rotations import ROTATIONS
 from fabfold.meshes import vector_areas
 from fabfold.printing.profiles import Profile
+from fabfold.printing.standing import centre_of_mass, stands_over
 
 __all__ = ["LaidBody", "Plates", "lay_out", "lay_out_plates", "on_plate"]
 
@@ -122,6 +124,16 @@ class Plates:
         return cls(laid, plate, poses, (wide, deep, high))
 
     @property
+    def supported(self) -> list[int]:
+        """Indices of the bodies that need support under them."""
+        return [entry.body for entry in self.laid if entry.supported]
+
+    @property
+    def leaning(self) -> list[int]:
+        """Indices of the bodies that would topple without a brim, and have no support."""
+        return [entry.body for entry in self.laid if entry.topples and not entry.supported]
+
+    @property
     def count(self) -> int:
         """Number of plates."""
         return int(self.plate.max()) + 1 if len(self.plate) else 0
@@ -167,21 +179,18 @@ def lay_out(
         flat = (down < -0.999) & (np.ptp(corners[..., 2], axis=1) < _FLAT_MM)
         touching = flat & (corners[..., 2].max(axis=1) < low + _FLAT_MM)
         contact = float(size[touching].sum())
-        level = float(low)
         supported = contact < CONTACT_MM2
         if supported:
             # The flat face over the barrels that stand below it.
-            near = flat & (corners[..., 2].max(axis=1) < low + deep)
-            contact = float(size[near].sum())
-            touching = near
-            level = float(np.median(corners[near][..., 2])) if near.any() else level
+            touching = flat & (corners[..., 2].max(axis=1) < low + deep)
+            contact = float(size[touching].sum())
         hangs = (down < limit - 1e-6) & ~touching
         overhang = float(size[hangs].sum())
         upright = sum(abs(float(rotation[2] @ axis)) > 0.5 for axis in axes)
         extent = np.ptp(points, axis=0)
         laid = LaidBody(
             body, rotation, extent, round(contact, 2), round(overhang, 2), supported,
-            _topples(corners, touching),
+            not stands_over(centre_of_mass(corners), corners[touching].reshape(-1, 3)[:, :2]),
         )  # fmt: skip
         key = (supported, contact < CONTACT_MM2, round(overhang), -upright, extent[2])
         if best is None or key < best[0]:
@@ -196,19 +205,6 @@ def _six_faces() -> list[Floats]:
     for rotation in ROTATIONS:
         found.setdefault(tuple(rotation[2].tolist()), rotation.astype(np.float64))
     return [found[key] for key in sorted(found)]
-
-
-def _topples(corners: Floats, touching: NDArray[np.bool_]) -> bool:
-    """Whether the centre of mass is not over the convex hull of the contact."""
-    from scipy.spatial import Delaunay, QhullError
-
-    volumes = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
-    centre = (volumes[:, None] * corners.sum(axis=1) / 4).sum(axis=0) / volumes.sum()
-    under = corners[touching].reshape(-1, 3)[:, :2]
-    try:
-        return bool(Delaunay(under).find_simplex(centre[:2]) < 0)
-    except (QhullError, ValueError):
-        return True
 
 
 def lay_out_plates(joinery: Joinery, bores: Sequence[PinBore], profile: Profile) -> Plates:
@@ -305,8 +301,6 @@ def on_plate(joinery: Joinery, plates: Plates, index: int) -> Joinery:
     Joinery
         Those bodies alone.
     """
-    bodies = []
-    for body in np.flatnonzero(plates.plate == index):
-        mesh, pose = joinery.bodies[body], plates.poses[body]
-        bodies.append(BodyMesh(mesh.name, mesh.vertices @ pose[:3, :3].T + pose[:3, 3], mesh.faces))
-    return replace(joinery, bodies=tuple(bodies), pins=())
+    laid = posed(joinery, plates.poses)
+    on = np.flatnonzero(plates.plate == index)
+    return replace(laid, bodies=tuple(laid.bodies[body] for body in on), pins=())

@@ -15,11 +15,12 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BAMBU", "bambu_model", "bambu_plates", "bambu_project"]
+__all__ = ["BAMBU", "UNIT_MATRIX", "bambu_model", "bambu_plates", "bambu_project"]
 
 #: What ``Application`` says: the release whose form is written.
 BAMBU = "BambuStudio-01.09.00.00"
-_UNIT_MATRIX = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
+#: Matrix of a part that stays where it is, as both families of slicers write it.
+UNIT_MATRIX = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
 _HEAD = ['<?xml version="1.0" encoding="UTF-8"?>', "<config>"]
 
 
@@ -27,7 +28,7 @@ def _part(number: int, name: str, filament: int) -> list[str]:
     return [
         f'    <part id="{number}" subtype="normal_part">',
         f'      <metadata key="name" value={quoteattr(name)}/>',
-        f'      <metadata key="matrix" value="{_UNIT_MATRIX}"/>',
+        f'      <metadata key="matrix" value="{UNIT_MATRIX}"/>',
         f'      <metadata key="extruder" value="{filament}"/>',
         "    </part>",
     ]

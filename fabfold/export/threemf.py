@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.export.bambu import bambu_model, bambu_project
+from fabfold.export.bambu import UNIT_MATRIX, bambu_model, bambu_project
 from fabfold.export.colours import palette
 from fabfold.export.weld import printable_mesh
 from fabfold.files import replacing
@@ -69,7 +69,6 @@ _NAMESPACE = "urn:fabfold:kit"
 _RELATIONSHIP = "urn:fabfold:slicer-settings"
 #: Bed that a file for Bambu Studio names where none is known, mm.
 _BAMBU_BED_MM = (256.0, 256.0, 256.0)
-_UNIT_MATRIX = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
 _Mesh = tuple[NDArray[np.float32], NDArray[np.int32]]
 
 
@@ -303,7 +302,7 @@ def _prusa_config(whole: Any, title: str, names: list[str], meshes: list[_Mesh])
             f'  <volume firstid="{start}" lastid="{start + len(faces) - 1}">',
             f'   <metadata type="volume" key="name" value={quoteattr(name)}/>',
             '   <metadata type="volume" key="volume_type" value="ModelPart"/>',
-            f'   <metadata type="volume" key="matrix" value="{_UNIT_MATRIX}"/>',
+            f'   <metadata type="volume" key="matrix" value="{UNIT_MATRIX}"/>',
             "  </volume>",
         ]
         start += len(faces)

@@ -7,19 +7,21 @@ so that the lattice point ``p`` lies at ``voxel_mm * p``. The origin of the kit 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
+from fabfold.joinery.bodies import BodyMesh
 from fabfold.tree.sharing import WHOLE, unpacked
 from fabfold.voxels.voxel_model import Voxels
 
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["as_manifold", "eroded_cells", "model_manifold", "occupancy"]
+__all__ = ["as_manifold", "eroded_cells", "model_manifold", "occupancy", "solids_of"]
 
 #: Shift of the scan lines in `occupancy`, as a share of the pitch: rays that run through the
 #: vertices and edges of axis-aligned boxes would meet degenerate hits.
@@ -64,6 +66,27 @@ def as_manifold(
             "repair the mesh and run again"
         )
     return solid
+
+
+def solids_of(bodies: Sequence[BodyMesh]) -> list[manifold3d.Manifold]:
+    """Bodies as solids, in the same order and place.
+
+    Parameters
+    ----------
+    bodies : sequence of BodyMesh
+        The meshes, mm.
+
+    Returns
+    -------
+    list of manifold3d.Manifold
+        In mm.
+
+    Raises
+    ------
+    GeometryError
+        If a mesh is not a closed two-manifold; it names the body.
+    """
+    return [as_manifold(body.vertices, body.faces, body.name) for body in bodies]
 
 
 def model_manifold(voxels: Voxels, voxel_mm: float) -> manifold3d.Manifold:

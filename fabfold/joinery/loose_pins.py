@@ -34,7 +34,6 @@ __all__ = [
     "meshes_with_pins",
     "pin_bores",
     "pin_rod",
-    "solids_of",
     "with_pins",
 ]
 
@@ -231,11 +230,6 @@ def pin_rod(
     face = bore.face(end)
     start = bore.face(-end) + end * WEB_MM * bore.axis if from_web else face
     return cylinder_between(start, face + end * PUSHER_MM * bore.axis, radius_mm, outside=True)
-
-
-def solids_of(joinery: Joinery) -> list[manifold3d.Manifold]:
-    """The bodies as solids, mm, shape A."""
-    return [as_manifold(body.vertices, body.faces, body.name) for body in joinery.bodies]
 
 
 def with_pins(

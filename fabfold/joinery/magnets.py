@@ -19,7 +19,8 @@ from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.joinery.booleans import subtract
-from fabfold.joinery.loose_pins import cylinder_between, solids_of
+from fabfold.joinery.cells import solids_of
+from fabfold.joinery.loose_pins import cylinder_between
 from fabfold.joinery.soundness import printable_body
 from fabfold.tree.fold_tree import FoldTree
 
@@ -36,7 +37,7 @@ _ROOM_MM, _DEEP_MM, _WALL_MM = 0.2, 0.2, 0.8
 _PLACES = (0.0, 0.22, -0.22)
 #: Share of a pocket with its wall that has to be material.
 _FILLED = 0.985
-#: Share of the faces' contact patch that has to be material for the faces to meet.
+#: Radius and depth of the disc of material in the middle of a face that makes it flat, mm.
 _PATCH_MM, _SKIN_MM = 2.0, 0.4
 #: Speeds below this count as none; a hinge turns at most at 1.
 _STILL = 1e-6
@@ -172,7 +173,7 @@ def hold_shut(
     """
     poses = poses_in_mm(tree, joinery, motion.angles_deg[-1])
     speeds = _Speeds(tree, joinery, poses)
-    solids = solids_of(joinery)
+    solids = solids_of(joinery.bodies)
     meetings = _meetings(tree, joinery, poses)
     shut = [speeds.parting(m) for m in meetings if _flush(m, joinery, solids, poses)]
     bounds = np.concatenate(shut) if shut else np.zeros((0, len(tree.hinges)))

@@ -6,7 +6,7 @@ same point. Such a mesh must still be a closed two-manifold.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ __all__ = [
     "mesh_faults",
     "meshlab_set",
     "piece_count",
+    "piece_of_vertices",
     "printable_body",
     "stl_mesh",
 ]
@@ -161,6 +162,31 @@ def meshlab_set(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> pyme
     return meshes
 
 
+def piece_of_vertices(count: int, faces: NDArray[np.integer[Any]]) -> NDArray[np.int32]:
+    """Which piece of a mesh each vertex belongs to.
+
+    Parameters
+    ----------
+    count : int
+        Number of vertices.
+    faces : (f, 3) integer array
+        Triangles as indices of vertices.
+
+    Returns
+    -------
+    (count,) int32 array
+        Numbers from 0; a vertex that no triangle uses is a piece of its own.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    ends = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    graph = coo_matrix(
+        (np.ones(len(ends), dtype=np.int8), (ends[:, 0], ends[:, 1])), shape=(count, count)
+    )
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int32)
+
+
 def piece_count(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> int:
     """Number of pieces of a mesh that are connected along edges.
 
@@ -176,14 +202,7 @@ def piece_count(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> int:
     int
         At least 1 for a mesh that is not empty.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    ends = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    graph = coo_matrix(
-        (np.ones(len(ends), dtype=np.int8), (ends[:, 0], ends[:, 1])), shape=(len(vertices),) * 2
-    )
-    return int(connected_components(graph, directed=False)[0])
+    return int(piece_of_vertices(len(vertices), faces).max(initial=-1)) + 1
 
 
 def printable_body(

@@ -83,8 +83,7 @@ def run_checks(built: BuiltTree, mode: PrintMode, progress: Progress) -> list[Ch
     else:
         from fabfold.apart.apart_checks import check_apart
 
-        progress.update(0.05, "putting it together")
-        checks += check_apart(tree, joinery, built.apart)
+        checks += check_apart(joinery, built.apart)
     if built.retention is not None:
         checks.append(_held(built, built.retention))
     progress.update(0.1, "printability")

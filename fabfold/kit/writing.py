@@ -174,10 +174,8 @@ def _printed_apart(built: BuiltTree) -> dict[str, Any]:
         "pins": len(joinery.pins),
         "pin_mm": 2 * joinery.pin_radius_mm,
         "plates": apart.plates.count,
-        "bodies_with_support": [names[e.body] for e in apart.plates.laid if e.supported],
-        "bodies_with_brim": [
-            names[e.body] for e in apart.plates.laid if e.topples and not e.supported
-        ],
+        "bodies_with_support": [names[body] for body in apart.plates.supported],
+        "bodies_with_brim": [names[body] for body in apart.plates.leaning],
     }
 
 

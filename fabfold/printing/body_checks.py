@@ -8,7 +8,7 @@ from __future__ import annotations
 from fabfold.errors import GeometryError
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
-from fabfold.joinery.cells import as_manifold
+from fabfold.joinery.cells import solids_of
 from fabfold.printing.checks import Check
 from fabfold.printing.gap_checks import check_gaps
 from fabfold.printing.overhang_checks import check_overhang
@@ -53,7 +53,7 @@ def check_bodies(
     progress.update(0.0, "reading the bodies")
     checks = check_topology(joinery.bodies, progress)
     try:
-        solids = [as_manifold(body.vertices, body.faces, body.name) for body in joinery.bodies]
+        solids = solids_of(joinery.bodies)
     except GeometryError as error:
         # Nothing below can be measured on a mesh that is no solid.
         return [*checks, Check("bodies are solids", 1.0, 0.0, "bodies", False, str(error))]

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError, ModelError
 from fabfold.joinery.bodies import BodyMesh
-from fabfold.joinery.cells import as_manifold
-from fabfold.joinery.soundness import piece_count
+from fabfold.joinery.cells import solids_of
+from fabfold.joinery.soundness import piece_of_vertices
 from fabfold.meshes import compact, face_normals, mesh_volume, weld
 from fabfold.printing.checks import Check
 from fabfold.printing.gap_checks import check_gaps
 from fabfold.printing.profiles import Profile
+from fabfold.printing.standing import centre_of_mass, stands_over
 from fabfold.printing.thickness import ray_thickness, surface_area
 from fabfold.printing.topology_checks import check_topology
 from fabfold.printing.wall_checks import thin_share
@@ -63,17 +64,11 @@ def parts_of(path: Path) -> tuple[list[BodyMesh], list[float]]:
     ModelError
         If the file cannot be read, or holds too many pieces.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     from fabfold.solid.load import read_mesh
 
     raw = read_mesh(path)
     points, faces = weld(raw.vertices, raw.faces, order="xyz")
-    links = np.concatenate([faces[:, :2], faces[:, 1:]])
-    graph = coo_matrix((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=[len(points)] * 2)
-    _, label = connected_components(graph, directed=False)
-    owner = label[faces[:, 0]]
+    owner = piece_of_vertices(len(points), faces)[faces[:, 0]]
     names, first = np.unique(owner, return_index=True)
     if len(names) > _MOST_PARTS:
         raise ModelError(
@@ -117,7 +112,7 @@ def check_file(path: Path, profile: Profile, progress: Progress) -> list[Check]:
     checks = [check for check in checks if check.name != "one piece a body"]
     checks.append(_pockets(pockets, profile))
     try:
-        solids = [as_manifold(part.vertices, part.faces, part.name) for part in parts]
+        solids = solids_of(parts)
     except GeometryError as error:
         # Nothing below can be measured on a mesh that is no solid.
         return [*checks, Check("parts are solids", 1.0, 0.0, "parts", False, str(error))]
@@ -203,9 +198,8 @@ def _overhang(parts: Sequence[BodyMesh], profile: Profile) -> Check:
         if found > most:
             worst, most = part.name, found
     note = f"steeper than {profile.max_overhang_deg:g}° as it lies"
-    return Check(
-        "overhang", area, None, "mm²", True, note + (f"; most on {worst}" if worst else "")
-    )
+    note += f"; most on {worst}" if worst else ""
+    return Check("overhang", area, None, "mm²", True, note)
 
 
 def _lying_area(part: BodyMesh, low: float) -> float:
@@ -228,21 +222,10 @@ def _contact(parts: Sequence[BodyMesh]) -> Check:
 
 def _toppling(parts: Sequence[BodyMesh]) -> Check:
     """Whether the centre of mass of all is over what touches the plate."""
-    from scipy.spatial import Delaunay, QhullError
-
-    low = min(part.vertices[:, 2].min() for part in parts)
-    volume, moment, under = 0.0, np.zeros(3), []
-    for part in parts:
-        corners = part.vertices[part.faces]
-        pieces = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
-        volume += float(pieces.sum())
-        moment += (pieces[:, None] * corners.sum(axis=1) / 4).sum(axis=0)
-        under.append(part.vertices[part.vertices[:, 2] < low + _FLAT_MM][:, :2])
-    centre = moment / volume
-    try:
-        stands = bool(Delaunay(np.concatenate(under)).find_simplex(centre[:2]) >= 0)
-    except (QhullError, ValueError):
-        stands = False
+    points = np.concatenate([part.vertices for part in parts])
+    low = points[:, 2].min()
+    centre = centre_of_mass(np.concatenate([part.vertices[part.faces] for part in parts]))
+    stands = stands_over(centre, points[points[:, 2] < low + _FLAT_MM][:, :2])
     x, y = centre[:2]
     where = "over what touches the plate" if stands else "beside what touches it: add a brim"
     return Check(
@@ -270,9 +253,9 @@ def _extent(parts: Sequence[BodyMesh], profile: Profile) -> Check:
 
 def _material(parts: Sequence[BodyMesh], profile: Profile) -> Check:
     volume = sum(part.volume for part in parts) / 1000.0
-    density = _DENSITY.get(profile.material.split()[0] if profile.material else "", 1.15)
-    pieces = sum(piece_count(part.vertices, part.faces) for part in parts)
+    material = profile.material or "material"
+    grams = volume * _DENSITY.get(material.split()[0], 1.15)
     return Check(
         "material", volume, None, "cm³", True,
-        f"{pieces} parts; {volume * density:.0f} g of {profile.material or 'material'} if solid",
+        f"{len(parts)} parts; {grams:.0f} g of {material} if solid",
     )  # fmt: skip
