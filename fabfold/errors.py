@@ -21,6 +21,8 @@ Every message says what is wrong, where, and what to do about it.
 
 from __future__ import annotations
 
+import errno
+
 __all__ = [
     "CheckError",
     "FabfoldError",
@@ -35,7 +37,23 @@ __all__ = [
     "RecipeError",
     "TemplateError",
     "WorkerError",
+    "system_message",
 ]
+
+#: What to do about an error of the file system.
+_REMEDIES = {
+    errno.EACCES: "it may not be read or written by you; change its permissions or choose another",
+    errno.EPERM: "it may not be changed by you; choose another place",
+    errno.EROFS: "that place can only be read; give another with --output",
+    errno.ENOSPC: "the disk is full; make room and run the same command again, it goes on",
+    errno.EDQUOT: "your share of the disk is full; make room and run the same command again",
+    errno.ENAMETOOLONG: "the name is too long; give a shorter one",
+    errno.ENOTDIR: "a part of that path is a file, not a folder; give another",
+    errno.EISDIR: "that is a folder, a file is wanted",
+    errno.ENOENT: "there is no such file, folder or place to write to",
+    errno.EMFILE: "too many files are open; close other programs",
+    errno.EPIPE: "the program that reads the output has ended",
+}
 
 
 class FabfoldError(Exception):
@@ -100,3 +118,23 @@ class GeometryError(FabfoldError):
 
 class WorkerError(FabfoldError):
     """The worker processes or the cluster cannot go on with the search."""
+
+
+def system_message(error: OSError) -> str:
+    """One sentence about an error of the file system: where, what, and what to do.
+
+    Parameters
+    ----------
+    error : OSError
+        What was raised.
+
+    Returns
+    -------
+    str
+        The sentence.
+    """
+    what = error.strerror or str(error) or type(error).__name__
+    name = error.filename2 if error.filename2 is not None else error.filename
+    where = "" if name is None else f"{str(name)[:200]}: "
+    remedy = _REMEDIES.get(error.errno or 0)
+    return f"{where}{what}" + ("" if remedy is None else f": {remedy}")

@@ -360,6 +360,8 @@ def _joined(bodies: Sequence[CouponBody]) -> MeshPart:
 def _write_3mf(path: Path, bodies: Sequence[CouponBody], title: str) -> None:
     import lib3mf
 
+    from .package import package_bytes
+
     mesh = _joined(bodies)
     wrapper = lib3mf.get_wrapper()
     model = wrapper.CreateModel()
@@ -375,7 +377,7 @@ def _write_3mf(path: Path, bodies: Sequence[CouponBody], title: str) -> None:
     item = model.AddBuildItem(whole, wrapper.GetIdentityTransform())
     item.SetUUID(str(uuid.uuid5(space, "item")))
     model.SetBuildUUID(str(uuid.uuid5(space, "build")))
-    model.QueryWriter("3mf").WriteToFile(str(path))
+    path.write_bytes(package_bytes(model.QueryWriter("3mf")))
 
 
 def _write_stl(path: Path, bodies: Sequence[CouponBody], title: str) -> None:

@@ -35,7 +35,7 @@ def test_a_first_kit_has_bodies_and_the_proof(bar_kit, found, tmp_path):
     tree = json.loads((tmp_path / "tree.json").read_text("utf-8"))
     motion = json.loads((tmp_path / "motion.json").read_text("utf-8"))
     assert len(tree["hinges"]) == len(candidate.tree.hinges)
-    assert motion["certificate"]["min_gap_mm"] >= bar_kit.profile().min_gap_mm
+    assert motion["certificate"]["min_gap_mm"] >= bar_kit.print_mode().profile.min_gap_mm
     bodies = sorted((tmp_path / "bodies").glob("*.stl"))
     assert len(bodies) == len(candidate.tree.bodies)
     assert all(trimesh.load(path).is_watertight for path in bodies)

@@ -46,7 +46,7 @@ def test_the_bar_folds_into_the_box(bar_kit):
     assert len(tree.source) == 8
     assert {tuple(cell) for cell in tree.target} == {tuple(c) for c in tree.template.cells}
     np.testing.assert_array_equal(motion.angles_deg[-1], tree.fold_angles)
-    assert motion.certificate["min_gap_mm"] >= bar_kit.profile().min_gap_mm
+    assert motion.certificate["min_gap_mm"] >= bar_kit.print_mode().profile.min_gap_mm
     assert len(motion.certificate["moves"]) == len(motion.moves) - 1
 
 

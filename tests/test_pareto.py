@@ -55,7 +55,7 @@ def test_list_of_a_kit_and_going_on_with_one(tmp_path, monkeypatch):
         "effort": "quick",
     }
     kit = Kit.from_model(tmp_path / "bar.stl", folder=tmp_path / "kit", workers=1, **options)
-    kit.list_pareto()
+    kit.run("pareto")
     found = kit.pareto()
     assert [s.joints for s in found] == sorted(s.joints for s in found)
     assert not any(beats(a, b) for a in found for b in found)

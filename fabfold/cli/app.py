@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import functools
+import io
+import os
 import signal
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -50,7 +53,7 @@ from fabfold.cli.command_options import (
     VoxelMm,
     Workers,
 )
-from fabfold.errors import CheckError, FabfoldError, RecipeError
+from fabfold.errors import CheckError, FabfoldError, InputError, RecipeError, system_message
 from fabfold.version import __version__
 
 if TYPE_CHECKING:
@@ -75,9 +78,14 @@ def _guarded(command: Callable[..., None]) -> Callable[..., None]:
     def run(*args: Any, **kwargs: Any) -> None:
         try:
             command(*args, **kwargs)
+            sys.stdout.flush()  # Here, so that a full disk behind it is told like any other.
         except FabfoldError as error:
             typer.echo(f"fabfold: {error}", err=True)
             raise typer.Exit(error.exit_code) from None
+        except OSError as error:
+            _forget_stdout()
+            typer.echo(f"fabfold: {system_message(error)}", err=True)
+            raise typer.Exit(InputError.exit_code) from None
         except KeyboardInterrupt:
             typer.echo(
                 "fabfold: stopped; what is done is kept, the same command goes on from there",
@@ -86,6 +94,14 @@ def _guarded(command: Callable[..., None]) -> Callable[..., None]:
             raise typer.Exit(130) from None
 
     return run
+
+
+def _forget_stdout() -> None:
+    """What could not be written to the standard output is not tried again at the end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _triple(text: str | None, option: str) -> tuple[float, float, float] | None:
@@ -220,7 +236,7 @@ def _show_pareto(kit: Kit, stage: str) -> None:
 
     if stage != "fit":
         raise RecipeError(f"--pareto goes with 'fabfold fit', not with {stage!r}")
-    kit.list_pareto()
+    kit.run("pareto")
     show_pareto(kit)
 
 
@@ -317,4 +333,11 @@ def _root(
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with 0, 1, 2, 3 or 130 (see ``fabfold.errors``)."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # Packages start Python too (glfw does, for MuJoCo): none of them takes a numpy.py in the
+    # working folder for numpy.
+    os.environ["PYTHONSAFEPATH"] = "1"
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that knows ASCII only shows a question mark, and the run goes on.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     app(args=arguments)

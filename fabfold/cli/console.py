@@ -140,7 +140,8 @@ def show_result(kit: Kit, stage: str) -> None:
 
 
 def _result_lines(kit: Kit, stage: str) -> list[str]:
-    lines = [f"note: {note}" for note in kit.cut_solid().notes]
+    notes = [*([kit.damage] if kit.damage else []), *kit.cut_solid().notes]
+    lines = [f"note: {note}" for note in notes]
     if stage == "voxelize":
         template = kit.template
         even, odd = template.colours

@@ -41,7 +41,7 @@ from fabfold.errors import GeometryError
 from fabfold.export.bambu import UNIT_MATRIX, bambu_model, bambu_project
 from fabfold.export.colours import palette
 from fabfold.export.weld import printable_mesh
-from fabfold.files import replacing
+from fabfold.files import write_bytes
 from fabfold.joinery.bodies import Joinery
 
 __all__ = ["Layout", "posed", "write_3mf"]
@@ -141,6 +141,7 @@ def write_3mf(
     import lib3mf
 
     from fabfold.version import __version__
+    from hinges.package import package_bytes
 
     if colours is None:
         colours = palette(len(joinery.bodies))
@@ -199,9 +200,7 @@ def write_3mf(
     _attach(model, attached, thumbnail)
     writer = model.QueryWriter("3mf")
     writer.SetDecimalPrecision(_DECIMALS)
-    with replacing(path) as temporary:
-        writer.WriteToFile(str(temporary))
-        temporary.write_bytes(_repacked(temporary.read_bytes()))
+    write_bytes(path, _repacked(package_bytes(writer)))
 
 
 def _attach(model: Any, settings: Mapping[str, str], thumbnail: bytes | None) -> None:

@@ -9,12 +9,12 @@ import sys
 import threading
 from pathlib import Path
 
+from fabfold.child_process import module_call
 from fabfold.fold.motion import motion_of
 from fabfold.kit.stages import PlannedTree, build
 from fabfold.printing.print_mode import PrintMode
 from fabfold.progress import Listener
 from fabfold.recipe.recipe import Recipe
-from fabfold.search.processes import module_call
 from fabfold.search.rounds import Found
 from fabfold.tree.bound import closed_share
 

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from fabfold.kit.early import EarlyKit
     from fabfold.printing.checks import Check
     from fabfold.printing.print_mode import PrintMode
-    from fabfold.printing.profiles import Profile
     from fabfold.search.kernels import KernelCompiler
     from fabfold.search.pareto import Solution
     from fabfold.search.rounds import Found, Rounds
@@ -91,6 +90,7 @@ class Kit(StageRunner):
         self.scheduler = scheduler
         self.seconds = seconds
         self._model = model
+        self._accepted = False
         self._early: EarlyKit | None = None
         self._compiler: KernelCompiler | None = None
         self._template_file = template
@@ -99,6 +99,7 @@ class Kit(StageRunner):
             self._template = replace(self._template, joints="inside")
         if folder is not None:
             require_free_folder(folder)
+        self.print_mode()  # An unknown profile, pin or gap is refused before anything is read.
 
     @classmethod
     def from_model(
@@ -130,6 +131,11 @@ class Kit(StageRunner):
         )
 
     @property
+    def damage(self) -> str:
+        """What of the kit folder could not be read and is made again; empty where all could."""
+        return self._store.damage
+
+    @property
     def template(self) -> Template:
         """The target shape, as it is filled (before any folds of its own)."""
         return self._template
@@ -143,14 +149,12 @@ class Kit(StageRunner):
 
         def make(progress: Progress) -> Solid:
             progress.update(None, self.recipe.model)
-            source: str | Path = self.recipe.model
-            if self._model is not None:
-                source = self._store.keep(self._model, self.recipe.sha256, "model")
-            solid = load_model(source)
+            solid = load_model(self.recipe.model if self._model is None else self._model)
             progress.update(1.0, f"{len(solid.faces)} triangles")
             return solid
 
-        return self._stage("solid", keys.solid_key(self.recipe), make, save_solid, load_solid)
+        key = keys.solid_key(self.recipe)
+        return self._stage("solid", key, make, save_solid, load_solid, on_trial=True)
 
     def voxelize(self) -> list[Voxels]:
         """Voxelizations of the model, best first (paper section 3)."""
@@ -168,6 +172,7 @@ class Kit(StageRunner):
         from fabfold.kit.cutting_stage import cut_model
         from fabfold.kit.stage_files import load_cut, save_cut
 
+        self.print_mode().require_hinge(self.recipe.voxel_mm)
         solid = self.solid()
         regions = self.wishes().regions
 
@@ -262,16 +267,27 @@ class Kit(StageRunner):
         KitError
             If there is no folder to write to, or it holds something else.
         """
-        from fabfold.kit.early import EarlyKit
-        from fabfold.kit.step_process import StepProcess
-        from fabfold.kit.writing import write_kit
-
         target = self.folder if folder is None else Path(folder)
         if target is None:
             raise KitError("where to? Give a folder to export to")
         require_free_folder(target)
+        own = target == self.folder
+        store = self._store if own else StageStore(target)
+        with store.locked():
+            self._export(target, store, own=own)
+        return target
+
+    def _export(self, target: Path, store: StageStore, *, own: bool) -> None:
+        from fabfold.kit.early import EarlyKit
+        from fabfold.kit.step_process import StepProcess
+        from fabfold.kit.writing import remove_named, write_kit
+
         mode = self.print_mode()
-        if target == self.folder and not self.recipe.pick:
+        self.cut_solid()  # Before anything in the folder changes.
+        store.take()
+        earlier = set(store.names) - {self.recipe.name}
+        store.record_names([*earlier, self.recipe.name])
+        if own and not self.recipe.pick:
             with EarlyKit(target, self.recipe, mode, self.listener) as self._early:
                 self.fold()
         built = self.join()
@@ -284,17 +300,23 @@ class Kit(StageRunner):
                     step.wait, self.wish_report(built.planned, built.joinery), self._template,
                     self.box_closure(built.planned),
                 )  # fmt: skip
-        if target != self.folder:
-            if self._model is not None:
-                StageStore(target).keep(self._model, self.recipe.sha256, "model")
-            self._keep_template(StageStore(target))
-        return target
+        remove_named(target, earlier)
+        store.record_names([self.recipe.name])
+        if not own:
+            self._keep_inputs(store)
 
     def run(self, stage: str) -> None:
-        """Run one stage by name, with all before it that is missing, and write its kit files."""
+        """Run one stage by name, with all before it that is missing, and write its kit files.
+
+        Raises
+        ------
+        KitError
+            If another run is at work in the kit folder.
+        """
         from fabfold.kit.writing import write_stage
 
-        write_stage(self, stage, getattr(self, stage)())
+        with self._store.locked():
+            write_stage(self, stage, getattr(self, stage)())
 
     # How the stages hang together ---------------------------------------------------------------
 
@@ -314,11 +336,10 @@ class Kit(StageRunner):
         """Processor seconds that compiling the search's kernels took; part of the fit stage's."""
         return 0.0 if self._compiler is None else self._compiler.processor_seconds
 
-    def profile(self) -> Profile:
-        """Printer profile, with the gaps of the way in which the kit is printed."""
-        return self.print_mode().profile
-
-    def _keep_template(self, store: StageStore) -> None:
+    def _keep_inputs(self, store: StageStore) -> None:
+        """Copy the files that the recipe names."""
+        if self._model is not None:
+            store.keep(self._model, self.recipe.sha256, "model")
         if self._template_file is not None:
             store.keep(self._template_file, self.recipe.template_sha256, "template")
 
@@ -369,10 +390,7 @@ class Kit(StageRunner):
         """The wishes of the recipe, sampled on the model."""
         from fabfold.recipe.recipe_wishes import make_wishes
 
-        if "wishes" not in self._results:
-            self._results["wishes"] = make_wishes(self.recipe, self.solid())
-        result: Wishes = self._results["wishes"]
-        return result
+        return self._once("wishes", lambda: make_wishes(self.recipe, self.solid()))
 
     def wish_report(
         self, planned: PlannedTree, joinery: Joinery | None = None
@@ -400,21 +418,8 @@ class Kit(StageRunner):
         """
         from fabfold.search.pareto import solutions
 
-        if "pareto" not in self._results:
-            self._results["pareto"] = solutions(
-                self.recipe, self._rounds_of, self._open_progress, self.workers, self.scheduler
-            )
-        result: list[Solution] = self._results["pareto"]
-        return result
-
-    def list_pareto(self) -> None:
-        """Write ``pareto.json`` and a picture of each solution of the Pareto list."""
-        from fabfold.kit.writing import write_pareto
-
-        found = self.pareto()
-        if self.folder is not None:
-            with self.listener.stage("pictures") as progress:
-                write_pareto(self.folder, found, progress)
+        search = (self._rounds_of, self._open_progress, self.workers, self.scheduler)
+        return self._once("pareto", lambda: solutions(self.recipe, *search))
 
     def _picked(self) -> Solution:
         from fabfold.search.pareto import picked
@@ -434,11 +439,14 @@ class Kit(StageRunner):
             for voxels, candidate in pairs:
                 yield PlannedTree(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
 
-    def _begin(self) -> None:
-        """Write the recipe, and keep the template's file, before the first stage is made."""
-        if self.folder is not None:
+    def _accept(self) -> None:
+        """Write the recipe and keep the files that it names, before what was made is kept."""
+        if self.folder is not None and not self._accepted:
+            self._store.take()
+            self._keep_inputs(self._store)
             write_text(self.folder / "kit.toml", self.recipe.to_toml())
-            self._keep_template(self._store)
+            self._accepted = True
+        super()._accept()
 
 
 def open_kit(

@@ -36,14 +36,16 @@ class StageRunner:
         self.processor_seconds: dict[str, float] = {}
         self._store = store
         self._results: dict[str, Any] = {}
+        self._unsaved: list[Callable[[], None]] = []
 
-    def _begin(self) -> None:
-        """Do what comes before any stage is made."""
+    def _accept(self) -> None:
+        """Change the kit folder for what was made; called once its input is known to be good."""
+        while self._unsaved:
+            self._unsaved.pop(0)()
 
     @contextmanager
     def _open_progress(self, name: str) -> Iterator[Progress]:
         """Progress of a stage that is about to be made."""
-        self._begin()
         start = processor_seconds()
         try:
             with self.listener.stage(name) as progress:
@@ -52,6 +54,13 @@ class StageRunner:
             stage = name.partition("-")[0]  # the rounds of the search are numbered
             spent = self.processor_seconds.get(stage, 0.0)
             self.processor_seconds[stage] = spent + processor_seconds() - start
+
+    def _once(self, name: str, make: Callable[[], Result]) -> Result:
+        """What `make` gives, made the first time and kept in memory."""
+        if name not in self._results:
+            self._results[name] = make()
+        result: Result = self._results[name]
+        return result
 
     def _is_done(self, name: str, key: str) -> bool:
         """Whether the result of a stage is in memory or in the kit folder."""
@@ -64,8 +73,13 @@ class StageRunner:
         make: Callable[[Progress], Result],
         save: Callable[[StageStore, Result], list[str]],
         load: Callable[[StageStore, list[str]], Result],
+        *,
+        on_trial: bool = False,
     ) -> Result:
-        """Result of a stage: from memory, from the kit folder, or made now and kept."""
+        """Result of a stage: from memory, from the kit folder, or made now and kept.
+
+        One `on_trial` is kept once a later one has shown that something can be made of it.
+        """
         if name in self._results:
             result: Result = self._results[name]
             return result
@@ -75,6 +89,10 @@ class StageRunner:
             with self._open_progress(name) as progress:
                 result = make(progress)
             if self._store.folder is not None:
-                self._store.record(name, key, save(self._store, result))
+                self._unsaved.append(
+                    lambda: self._store.record(name, key, save(self._store, result))
+                )
+        if not on_trial:
+            self._accept()
         self._results[name] = result
         return result

@@ -10,11 +10,11 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
 
+from fabfold.child_process import module_call
 from fabfold.errors import GeometryError
 from fabfold.export.colours import body_colours
 from fabfold.export.step import write_step
 from fabfold.joinery.bodies import Joinery
-from fabfold.search.processes import module_call
 from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["StepProcess"]

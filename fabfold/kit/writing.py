@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "kit_summary",
+    "remove_named",
     "write_built",
     "write_checks",
     "write_kit",
@@ -45,6 +46,25 @@ __all__ = [
     "write_stage",
     "write_tree",
 ]
+
+
+#: Endings of the files that are called by the name of the kit.
+_NAMED = (".3mf", "-bambu.3mf", "-flat.3mf", ".step", ".urdf")
+
+
+def remove_named(folder: Path, names: Iterable[str]) -> None:
+    """Remove the files of kits of other names that were written into a folder before.
+
+    Parameters
+    ----------
+    folder : Path
+        Kit folder.
+    names : iterable of str
+        Their names.
+    """
+    for name in names:
+        for ending in _NAMED:
+            (folder / f"{name}{ending}").unlink(missing_ok=True)
 
 
 def write_stage(kit: Kit, stage: str, result: Any) -> None:
@@ -61,6 +81,10 @@ def write_stage(kit: Kit, stage: str, result: Any) -> None:
     """
     folder = kit.folder
     if folder is None or stage in ("solid", "voxelize", "export"):
+        return
+    if stage == "pareto":
+        with kit.listener.stage("pictures") as progress:
+            write_pareto(folder, result, progress)
         return
     if stage == "fit":
         write_tree(folder, result[0].tree, kit.recipe.voxel_mm)
@@ -104,7 +128,8 @@ def kit_summary(
                 "box_closed_at_most": round(closure.at_most, 4),
             }
         ),
-        "voxel_energy": {key: round(float(value), 4) for key, value in voxels.energy.items()},
+        # Sorted, as they come back from the kit folder.
+        "voxel_energy": {key: round(float(voxels.energy[key]), 4) for key in sorted(voxels.energy)},
         "moves": len(motion.moves) - 1,
         "voxel_mm": joinery.voxel_mm,
         "clearance_mm": joinery.clearance_mm,
@@ -334,6 +359,8 @@ def write_kit(
     progress.update(0.1, "bodies and 3MF")
     write_printable(folder, recipe, mode, built)
     flat = None if template is None else flat_poses(joinery, tree, motion, template)
+    if flat is None:
+        (folder / f"{name}-flat.3mf").unlink(missing_ok=True)
     if template is not None and flat is not None:
         write_3mf(
             folder / f"{name}-flat.3mf",

@@ -65,6 +65,24 @@ class PrintMode:
         fit = self.profile.apart
         return LoosePin(PINS[self.pin][0], fit.grip_mm, fit.slip_mm, entry="none")
 
+    def require_hinge(self, voxel_mm: float) -> None:
+        """Refuse a size of voxels that holds no hinge.
+
+        Parameters
+        ----------
+        voxel_mm : float
+            Printed side of a voxel, mm.
+
+        Raises
+        ------
+        RecipeError
+            With the smallest voxel that would do.
+        """
+        from fabfold.joinery.sizes import hinge_size
+
+        clearance = self.profile.clearance_mm
+        hinge_size(voxel_mm, clearance, gap_mm=self.face_gap_mm, pin=self.loose_pin())
+
 
 def print_mode(
     profile: Profile,

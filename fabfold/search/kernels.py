@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fabfold.child_process import module_call
 from fabfold.progress import Progress
-from fabfold.search.processes import module_call
 
 __all__ = ["HALVES", "KernelCompiler", "compile_half", "kernel_stamp"]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,37 +12,14 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
+from fabfold.child_process import safe_path
 from fabfold.search.seeds import Better, Done, Event, Job, Lost, run_seed
 from fabfold.tree.candidate import Candidate
 
-__all__ = ["InProcessExecutor", "ProcessExecutor", "module_call"]
+__all__ = ["InProcessExecutor", "ProcessExecutor"]
 
 #: Seconds that a worker has to end by itself before it is killed.
 PATIENCE = 5.0
-
-
-def module_call(module: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
-    """How a module of ours is run by the same Python in a process of its own.
-
-    Unlike a process of multiprocessing it does not read a script of the user's once more, so the
-    script needs no ``if __name__ == "__main__"``.
-
-    Parameters
-    ----------
-    module : str
-        Dotted name of the module.
-    *arguments : str
-        What it is given.
-
-    Returns
-    -------
-    command : list of str
-        Program and arguments.
-    environment : dict of str to str
-        Environment variables; the modules that are found here are found there.
-    """
-    path = os.pathsep.join(part for part in sys.path if part)
-    return [sys.executable, "-m", module, *arguments], {**os.environ, "PYTHONPATH": path}
 
 
 class InProcessExecutor:
@@ -133,7 +109,7 @@ class ProcessExecutor:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(theirs,), name="fabfold-seed", daemon=True)
-        with _interrupts_held():
+        with _interrupts_held(), safe_path():
             process.start()
         theirs.close()
         worker = _Worker(process, ours)

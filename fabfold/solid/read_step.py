@@ -6,7 +6,6 @@ happen to the program that asks.
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -15,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfold.child_process import module_call
 from fabfold.errors import ModelError
 from fabfold.solid.raw import RawMesh, head_of, what_is_it
 from fabfold.solid.tessellate import tessellate
@@ -43,11 +43,12 @@ def read_step(path: Path) -> RawMesh:
     _check(path)
     with tempfile.TemporaryDirectory(prefix="fabfold-") as folder:
         result = Path(folder) / "mesh.npz"
-        root = str(Path(__file__).resolve().parents[2])
-        search = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
+        command, environment = module_call(
+            "fabfold.solid.read_step", str(path.resolve()), str(result)
+        )
         done = subprocess.run(
-            [sys.executable, "-m", "fabfold.solid.read_step", str(path.resolve()), str(result)],
-            env={**os.environ, "PYTHONPATH": search},
+            command,
+            env=environment,
             capture_output=True,
             encoding="utf-8",
             errors="replace",
