@@ -159,7 +159,7 @@ def solid_from_mesh(name: str, raw: RawMesh, sha256: str = "", label: str = "") 
 
         shells, done = wrap_surface(label, vertices, raw.faces, str(error.args[0]))
     notes += done
-    body = largest_piece(label, unite(label, shells, notes), notes)
+    body = largest_piece(label, unite(label, shells, notes), notes, scale)
     body = decimated(body, MAX_TRIANGLES)
     if len(raw.faces) > MAX_TRIANGLES:
         notes.append(f"{len(raw.faces):,} triangles were thinned to {body.num_tri():,}")

@@ -25,7 +25,9 @@ TOUCH_GAP = 0.005
 TOUCHING = 1e-9
 
 
-def largest_piece(name: str, united: manifold3d.Manifold, notes: list[str]) -> manifold3d.Manifold:
+def largest_piece(
+    name: str, united: manifold3d.Manifold, notes: list[str], scale: float = 1.0
+) -> manifold3d.Manifold:
     """The largest piece of a solid, with small pieces joined to it or dropped.
 
     Parameters
@@ -36,6 +38,8 @@ def largest_piece(name: str, united: manifold3d.Manifold, notes: list[str]) -> m
         Longest side about 1, without cavities.
     notes : list of str
         Sentences for the maker; what was done is appended.
+    scale : float
+        Model units of a length of 1, for messages.
 
     Returns
     -------
@@ -54,7 +58,7 @@ def largest_piece(name: str, united: manifold3d.Manifold, notes: list[str]) -> m
     volumes = np.array([part.volume() for part in parts])
     shares = volumes / volumes.sum()
     if shares[1] > LOOSE_SHARE:
-        raise _too_many(name, parts, shares)
+        raise _too_many(name, parts, shares, scale)
     body, loose = _join(parts)
     if joined := len(parts) - 1 - len(loose):
         notes.append(
@@ -64,7 +68,7 @@ def largest_piece(name: str, united: manifold3d.Manifold, notes: list[str]) -> m
     if loose:
         share = float(shares[loose].sum())
         if share > LOOSE_SHARE:
-            raise _too_many(name, parts, shares)
+            raise _too_many(name, parts, shares, scale)
         notes.append(f"{were(len(loose), 'loose piece')} dropped ({share:.2%} of the volume)")
     return body
 
@@ -109,13 +113,15 @@ def _nearest(part: manifold3d.Manifold, body: manifold3d.Manifold) -> NDArray[np
 
 
 def _too_many(
-    name: str, parts: list[manifold3d.Manifold], shares: NDArray[np.float64]
+    name: str, parts: list[manifold3d.Manifold], shares: NDArray[np.float64], scale: float
 ) -> ModelError:
     told = [f"{share:.0%}" for share in shares if share >= 0.005][:6]
     if len(parts) > len(told):
         told.append(f"{len(parts) - len(told)} smaller")
-    touch = parts[0].min_gap(parts[1], TOUCH_GAP) < TOUCHING
-    how = "touch in an edge or a corner only, which has no strength" if touch else "stand apart"
+    gap = parts[0].min_gap(parts[1], 2.0)
+    how = "touch in an edge or a corner only, which has no strength"
+    if gap >= TOUCHING:
+        how = f"stand apart, the two largest by {gap * scale:.3g} in the model's units"
     return ModelError(
         f"{name} is not one piece: it falls into {len(parts)} pieces that {how} "
         f"({', '.join(told)}; up to {LOOSE_SHARE:.0%} of the volume would be dropped); join them "

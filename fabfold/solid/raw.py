@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import ModelError
 
-__all__ = ["RawMesh", "head_of", "is_text", "no_faces", "what_is_it"]
+__all__ = ["RawMesh", "encoding_of", "head_of", "is_text", "no_faces", "what_is_it"]
 
 #: How the bytes of files begin that people rename by mistake.
 _SIGNATURES: tuple[tuple[bytes, str], ...] = (
@@ -110,6 +110,23 @@ def is_text(head: bytes) -> bool:
     """
     allowed = {9, 10, 11, 12, 13}
     return all(byte >= 32 or byte in allowed for byte in head)
+
+
+def encoding_of(path: Path) -> str:
+    """The encoding of a text file by its byte-order mark; UTF-8 where it has none.
+
+    Parameters
+    ----------
+    path : Path
+        Any file.
+
+    Returns
+    -------
+    str
+        Name of a codec, which skips the mark.
+    """
+    head = head_of(path, 3)
+    return "utf-16" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
 
 
 def head_of(path: Path, size: int = 1024) -> bytes:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ import numpy as np
 
 from fabfold.errors import ModelError
 from fabfold.solid.paint import colours_of_mesh
+from fabfold.solid.ply_polygons import read_ply_polygons, triangles_only
 from fabfold.solid.raw import RawMesh, head_of, no_faces, what_is_it
 
 __all__ = ["read_3mf", "read_glb", "read_ply"]
@@ -40,8 +43,10 @@ def read_ply(path: Path) -> RawMesh:
         If the file is no PLY, is shorter than its header says, or has no faces.
     """
     counts, single = _check_ply(path)
-    if not counts.get("face"):
+    if not counts.get("face") and not counts.get("tristrips"):
         raise no_faces(path.name, f" ({counts.get('vertex', 0)} points only)")
+    if counts.get("tristrips") or not triangles_only(path):
+        return read_ply_polygons(path, single)
     mesh = _load_with_trimesh(path, "ply")
     if len(mesh.vertices) < counts.get("vertex", 0) or len(mesh.faces) < counts["face"]:
         raise ModelError(
@@ -128,6 +133,7 @@ def read_glb(path: Path) -> RawMesh:
             f"{path.name} ends early: its header says {length:,} bytes, the file has {size:,}; "
             "export or download it again"
         )
+    _check_extensions(path)
     mesh = _load_with_trimesh(path, "glb")
     x, y, z = np.asarray(mesh.vertices, dtype=np.float64).T
     return RawMesh(
@@ -137,6 +143,45 @@ def read_glb(path: Path) -> RawMesh:
         float32=True,
         colours=colours_of_mesh(mesh),
     )
+
+
+#: Extensions of glTF that change how a model looks, not where its triangles are.
+_HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_xmp")
+#: Extensions that we read, beside those.
+_UNDERSTOOD = ("KHR_mesh_quantization",)
+#: What to do about those that people meet.
+_ADVICE = {
+    "KHR_draco_mesh_compression": "the meshes are compressed with Draco; export it without",
+    "EXT_meshopt_compression": "the meshes are compressed with meshopt; export it without",
+    "EXT_mesh_gpu_instancing": "copies are made when it is drawn; export it with real copies",
+}
+
+
+def _check_extensions(path: Path) -> None:
+    """Refuse, by its name, an extension without which the triangles are not what is meant."""
+    with path.open("rb") as stream:
+        stream.seek(12)
+        size, kind = struct.unpack("<I4s", stream.read(8).ljust(8, b"\0"))
+        try:
+            content = json.loads(stream.read(size)) if kind == b"JSON" else None
+        except (ValueError, RecursionError):
+            content = None
+    if not isinstance(content, dict):
+        raise ModelError(
+            f"{path.name} cannot be read as GLB: its table of contents is damaged; export the "
+            "model again"
+        )
+    required = content.get("extensionsRequired")
+    needed = {str(name) for name in required} if isinstance(required, list) else set()
+    nodes = content.get("nodes")
+    for node in nodes if isinstance(nodes, list) else ():
+        more = node.get("extensions") if isinstance(node, dict) else None
+        if isinstance(more, dict) and "EXT_mesh_gpu_instancing" in more:
+            needed.add("EXT_mesh_gpu_instancing")  # Left out, all copies but one would be gone.
+    for name in sorted(needed):
+        if not name.startswith(_HARMLESS) and name not in _UNDERSTOOD:
+            advice = _ADVICE.get(name, "export it without, or as another format")
+            raise ModelError(f"{path.name} needs the glTF extension {name}: {advice}")
 
 
 def _load_with_trimesh(path: Path, kind: str) -> Any:

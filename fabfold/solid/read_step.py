@@ -6,6 +6,7 @@ happen to the program that asks.
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tempfile
@@ -73,8 +74,9 @@ def read_step(path: Path) -> RawMesh:
 
 def _check(path: Path) -> None:
     """Refuse what can be told without the kernel."""
-    head = head_of(path)
-    if not head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"ISO-10303-21"):
+    head = head_of(path, 1 << 16)
+    # Comments may stand anywhere between words, before the first too.
+    if not re.match(rb"(?:\xef\xbb\xbf)?(?:\s|/\*.*?\*/)*ISO-10303-21", head, re.DOTALL):
         raise ModelError(
             f"{path.name} is not a STEP file but {what_is_it(head)}; export the model as STEP"
         )

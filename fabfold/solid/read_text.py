@@ -10,17 +10,20 @@ import numpy as np
 from fabfold.errors import ModelError
 from fabfold.solid.paint import colours_of_corners
 from fabfold.solid.polygon import triangulate_polygons
-from fabfold.solid.raw import RawMesh, head_of, is_text, no_faces, what_is_it
+from fabfold.solid.raw import RawMesh, encoding_of, head_of, is_text, no_faces, what_is_it
 
 __all__ = ["read_obj", "read_off"]
 
 _AGAIN = "export the model again"
+#: Colour of a face whose material is not known.
+_PLAIN = (255, 255, 255)
 
 
 def read_obj(path: Path) -> RawMesh:
-    """Read the vertices and faces of a Wavefront OBJ file; materials, normals, UVs are skipped.
+    """Read the vertices and faces of a Wavefront OBJ file; normals and UVs are skipped.
 
-    Colours are read where every vertex line has them, ``v x y z red green blue`` from 0 to 1.
+    Colours are read where every vertex line has them, ``v x y z red green blue`` from 0 to 1, or
+    from the materials' ``Kd`` where their file stands beside it.
 
     Parameters
     ----------
@@ -41,9 +44,16 @@ def read_obj(path: Path) -> RawMesh:
     vertices: list[tuple[float, ...]] = []
     painted: list[tuple[float, ...]] = []
     polygons: list[list[int]] = []
+    libraries: list[str] = []
+    used: list[str] = []
+    material = ""
     for number, line in _logical_lines(path):
         words = line.split()
-        if words[0] == "v":
+        if words[0] == "mtllib":
+            libraries.append(line.split(None, 1)[1] if len(words) > 1 else "")
+        elif words[0] == "usemtl":
+            material = line.split(None, 1)[1] if len(words) > 1 else ""
+        elif words[0] == "v":
             vertices.append(_numbers(path, number, words[1:4]))
             if len(words) == 7:
                 painted.append(_numbers(path, number, words[4:7]))
@@ -56,6 +66,7 @@ def read_obj(path: Path) -> RawMesh:
                     f"{len(indices)}; {_AGAIN}"
                 )
             polygons.append(indices)
+            used.append(material)
     if not vertices:
         raise ModelError(f"{path.name} has no vertices: it is not an OBJ model; {_AGAIN}")
     if not polygons:
@@ -68,7 +79,33 @@ def read_obj(path: Path) -> RawMesh:
     if len(painted) == len(vertices):
         shades = np.rint(255 * np.clip(np.array(painted), 0.0, 1.0)).astype(int)
         colours = colours_of_corners(faces, shades)
+    elif any(used) and (known := _materials(path, libraries)):
+        shades = np.array([known.get(name, _PLAIN) for name in used])
+        each = [len(polygon) - 2 for polygon in polygons]
+        colours = np.repeat(shades, each, axis=0).astype(np.uint8)
     return RawMesh(corners_of, faces, colours=colours)
+
+
+def _materials(path: Path, libraries: Sequence[str]) -> dict[str, tuple[int, ...]]:
+    """Colours by name, of the material files beside a model; a missing one is no loss."""
+    known: dict[str, tuple[int, ...]] = {}
+    for library in dict.fromkeys(libraries):
+        # Only the name counts: nothing outside the model's own folder is opened.
+        file = path.parent / library.replace("\\", "/").rpartition("/")[2]
+        if not library or not file.is_file():
+            continue
+        name = ""
+        for _, line in _logical_lines(file):
+            words = line.split()
+            if words[0] == "newmtl":
+                name = line.split(None, 1)[1] if len(words) > 1 else ""
+            elif words[0] == "Kd" and len(words) == 4:
+                try:
+                    kd = [float(word) for word in words[1:]]
+                except ValueError:
+                    continue
+                known[name] = tuple(round(255 * min(max(value, 0.0), 1.0)) for value in kd)
+    return known
 
 
 def _obj_index(path: Path, number: int, corner: str, known: int) -> int:
@@ -190,7 +227,7 @@ def _numbers(path: Path, number: int, words: list[str]) -> tuple[float, ...]:
 def _logical_lines(path: Path) -> Iterator[tuple[int, str]]:
     """Lines with their numbers, without comments and blanks, joined where one ends in a stroke."""
     pending = ""
-    with path.open(encoding="utf-8", errors="replace") as stream:
+    with path.open(encoding=encoding_of(path), errors="replace") as stream:
         for number, line in enumerate(stream, start=1):
             text = pending + line.split("#", 1)[0].strip()
             pending = ""
@@ -202,6 +239,8 @@ def _logical_lines(path: Path) -> Iterator[tuple[int, str]]:
 
 def _refuse_binary(path: Path, kind: str) -> None:
     head = head_of(path)
+    if encoding_of(path) == "utf-16":
+        head = head.decode("utf-16", "replace").encode("utf-8")
     if not is_text(head):
         raise ModelError(
             f"{path.name} is not {kind} file but {what_is_it(head)}: {_AGAIN}, "
