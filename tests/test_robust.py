@@ -182,3 +182,27 @@ def test_a_damaged_journal_is_told(bar, bar_options, tmp_path):
     assert "note: " in result.stdout
     assert "journal.json was damaged" in result.stdout
     assert json.loads(journal.read_text("utf-8")) == json.loads(whole)
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_stopped_run_ends_with_130_wherever_it_was(name, tmp_path):
+    # Inside an exec of a string, where Python would end by the signal itself.
+    code = f"""
+import os, signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from fabfold.cli.app import _guarded, app, main
+def hang():
+    exec("os.kill(os.getpid(), signal.{name})\\nfor _ in range(10**9): pass")
+app.command("hang")(_guarded(hang))
+main(["hang"])
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert result.returncode == 130, result.stderr
+    assert "goes on from there" in result.stderr

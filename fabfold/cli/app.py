@@ -71,6 +71,18 @@ app = typer.Typer(
 )
 
 
+class _Stopped(KeyboardInterrupt):
+    """Ctrl-C.
+
+    Python ends by the signal itself, not by our exit code, where a plain KeyboardInterrupt passed
+    through an ``exec`` of a string, as the making of a dataclass is, even if it was caught later.
+    """
+
+
+def _stop(*_: object) -> None:
+    raise _Stopped
+
+
 def _guarded(command: Callable[..., None]) -> Callable[..., None]:
     """Turn what fabfold reports, and Ctrl-C, into one sentence and an exit code."""
 
@@ -332,7 +344,9 @@ def _root(
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with 0, 1, 2, 3 or 130 (see ``fabfold.errors``)."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, _stop)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else a shell ignores it
+        signal.signal(signal.SIGINT, _stop)
     # Packages start Python too (glfw does, for MuJoCo): none of them takes a numpy.py in the
     # working folder for numpy.
     os.environ["PYTHONSAFEPATH"] = "1"
