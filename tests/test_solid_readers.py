@@ -16,7 +16,8 @@ from fabfold.errors import ModelError
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.load import load_solid
 from fabfold.solid.raw import RawMesh
-from fabfold.solid.read_binary import read_3mf, read_glb, read_ply
+from fabfold.solid.read_3mf import read_3mf
+from fabfold.solid.read_binary import read_glb, read_ply
 from fabfold.solid.read_stl import read_stl
 from fabfold.solid.read_text import read_obj, read_off
 

@@ -26,6 +26,7 @@ from fabfold.cli.command_options import (
     Keep,
     KeepWeight,
     MagnetName,
+    ObjectName,
     Origin,
     Output,
     Pareto,
@@ -158,6 +159,7 @@ def _stage(name: str, summary: str) -> None:
     def command(
         source: Source,
         output: Output = None,
+        object: ObjectName = None,
         template: TemplateName = None,
         template_cells: TemplateCells = None,
         voxel_mm: VoxelMm = None,

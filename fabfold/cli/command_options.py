@@ -20,6 +20,7 @@ __all__ = [
     "Keep",
     "KeepWeight",
     "MagnetName",
+    "ObjectName",
     "Origin",
     "Output",
     "Pareto",
@@ -59,6 +60,15 @@ Source = Annotated[
 Output = Annotated[
     Path | None,
     typer.Option("--output", "-o", metavar="KIT", help="Kit folder. Default: NAME-kit."),
+]
+ObjectName = Annotated[
+    str | None,
+    typer.Option(
+        "--object",
+        metavar="NAME",
+        help="Of a 3MF file with several objects: the name, or the number from 1, of the one to "
+        "take.",
+    ),
 ]
 TemplateName = Annotated[
     str | None,

@@ -16,7 +16,7 @@ __all__ = ["check_key", "fold_key", "join_key", "solid_key", "voxels_key"]
 
 def solid_key(recipe: Recipe) -> str:
     """Key of the solid: the model as it was given."""
-    return stage_key(__version__, recipe.model, recipe.sha256, "paint")
+    return stage_key(__version__, recipe.model, recipe.sha256, recipe.object, "dialects")
 
 
 def voxels_key(recipe: Recipe, template: Template) -> str:
@@ -24,6 +24,7 @@ def voxels_key(recipe: Recipe, template: Template) -> str:
     return stage_key(
         __version__,
         recipe.sha256 or recipe.model,
+        recipe.object,
         template.content,
         recipe.seed,
         [recipe.rotation, recipe.origin, recipe.pitch, recipe.drop_below],

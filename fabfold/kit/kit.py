@@ -149,7 +149,7 @@ class Kit(StageRunner):
 
         def make(progress: Progress) -> Solid:
             progress.update(None, self.recipe.model)
-            solid = load_model(self.recipe.model if self._model is None else self._model)
+            solid = load_model(self._model or self.recipe.model, self.recipe.object)
             progress.update(1.0, f"{len(solid.faces)} triangles")
             return solid
 

@@ -41,6 +41,9 @@ class Recipe(BaseModel):
 
     model: Annotated[str, Field(min_length=1, description="file name, or sample:NAME")]
     sha256: Annotated[str, Field(description="digest of the model's file")] = ""
+    object: Annotated[
+        str, Field(max_length=1000, description="name or number of the one object of a 3MF file")
+    ] = ""
     template: Annotated[str, Field(description="box-AxBxC, a template's name or file")]
     template_sha256: Annotated[str, Field(description="digest of the template's file")] = ""
     template_cells: Annotated[
@@ -134,12 +137,12 @@ class Recipe(BaseModel):
 
     @field_validator("prefer", mode="before")
     @classmethod
-    def _named_preference(cls, value: object) -> object:
+    def _named_preference(cls, value: Any) -> Any:
         return _PREFER.get(value, value) if isinstance(value, str) else value
 
     @field_validator("void", mode="before")
     @classmethod
-    def _named_void(cls, value: object) -> object:
+    def _named_void(cls, value: Any) -> Any:
         return _VOID.get(value, value) if isinstance(value, str) else value
 
     @field_validator("keep", "protect")
@@ -165,7 +168,7 @@ class Recipe(BaseModel):
 
     @field_validator("thicken", mode="before")
     @classmethod
-    def _at_most_a_voxel(cls, value: object, info: ValidationInfo) -> object:
+    def _at_most_a_voxel(cls, value: Any, info: ValidationInfo) -> Any:
         if value in ("auto", "off"):
             return value
         most = info.data.get("voxel_mm", 1000.0)

@@ -175,13 +175,15 @@ def draw_meshes() -> None:
         write_npz(_mesh_file(name), {"vertices": solid.vertices, "faces": solid.faces})
 
 
-def load_model(source: str | Path) -> Solid:
+def load_model(source: str | Path, wanted: str = "") -> Solid:
     """A model file or a built-in sample as a closed solid.
 
     Parameters
     ----------
     source : str or Path
         Path of a model file, or ``"sample:NAME"``.
+    wanted : str
+        Name or number of the one object of a 3MF file to take; empty takes all.
 
     Returns
     -------
@@ -198,7 +200,7 @@ def load_model(source: str | Path) -> Solid:
     text = str(source)
     if text.startswith(PREFIX):
         return load_sample(text.removeprefix(PREFIX))
-    return load_solid(source)
+    return load_solid(source, wanted)
 
 
 def mesh_sample(part: build123d.Part, known: Sample) -> Solid:

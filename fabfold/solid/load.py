@@ -6,6 +6,7 @@ shells, keep one piece, decimate a dense mesh, and go back to the model's own un
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +20,7 @@ from fabfold.solid.convert import decimated, to_mesh
 from fabfold.solid.paint import painted_faces
 from fabfold.solid.pieces import largest_piece
 from fabfold.solid.raw import RawMesh
+from fabfold.solid.read_3mf import read_3mf
 from fabfold.solid.surface import OpenSurfaceError, close_surface
 from fabfold.solid.topology import Points
 from fabfold.solid.union import MAX_TRIANGLES, unite
@@ -33,13 +35,15 @@ MIN_THICKNESS = 0.01
 MIN_STEPS = 1_000
 
 
-def load_solid(path: str | Path) -> Solid:
+def load_solid(path: str | Path, wanted: str = "") -> Solid:
     """Load a model as one closed, outward-oriented manifold.
 
     Parameters
     ----------
     path : str or Path
         A file with one of the suffixes :data:`FORMATS`.
+    wanted : str
+        Name or number of the one object of a 3MF file to take; empty takes all.
 
     Returns
     -------
@@ -62,17 +66,19 @@ def load_solid(path: str | Path) -> Solid:
     refused.
     """
     path = Path(path)
-    raw = read_mesh(path)
+    raw = read_mesh(path, wanted)
     return solid_from_mesh(path.stem, raw, sha256_of(path), label=path.name)
 
 
-def read_mesh(path: Path) -> RawMesh:
+def read_mesh(path: Path, wanted: str = "") -> RawMesh:
     """Read the triangles of a file, nothing repaired.
 
     Parameters
     ----------
     path : Path
         A file with one of the suffixes :data:`FORMATS`.
+    wanted : str
+        Name or number of the one object of a 3MF file to take; empty takes all.
 
     Returns
     -------
@@ -85,6 +91,10 @@ def read_mesh(path: Path) -> RawMesh:
         If the file cannot be read.
     """
     read = _reader(path)
+    if wanted:
+        if path.suffix.lower() != ".3mf":
+            raise ModelError(f"{path.name}: --object chooses in a 3MF file; leave it out")
+        read = functools.partial(read_3mf, wanted=wanted)
     try:
         raw = read(path)
     except OSError as error:
@@ -104,7 +114,7 @@ def _reader(path: Path) -> Callable[[Path], RawMesh]:
         ".off": read_text.read_off,
         ".ply": read_binary.read_ply,
         ".glb": read_binary.read_glb,
-        ".3mf": read_binary.read_3mf,
+        ".3mf": read_3mf,
         ".step": read_step.read_step,
         ".stp": read_step.read_step,
     }
@@ -159,7 +169,23 @@ def solid_from_mesh(name: str, raw: RawMesh, sha256: str = "", label: str = "") 
 
         shells, done = wrap_surface(label, vertices, raw.faces, str(error.args[0]))
     notes += done
-    body = largest_piece(label, unite(label, shells, notes), notes, scale)
+    united = unite(label, shells, notes)
+    if raw.negative is not None:
+        holes, _ = close_surface(label, (raw.negative[0] - centre) / scale, raw.negative[1])
+        united = united - unite(label, holes, [])
+        notes.append("a negative part was taken away from the solid, as the slicer does")
+        if united.is_empty():
+            raise ModelError(f"{label} has nothing left once its negative parts are taken away")
+    try:
+        body = largest_piece(label, united, notes, scale)
+    except ModelError as error:
+        if len(raw.objects) < 2:
+            raise
+        listed = ", ".join(f"{n}: {name}" for n, name in enumerate(raw.objects[:12], start=1))
+        raise ModelError(
+            f"{label} has {len(raw.objects)} objects that are not one piece; choose one with "
+            f"--object NAME or its number ({listed}{', ...' if len(raw.objects) > 12 else ''})"
+        ) from error
     body = decimated(body, MAX_TRIANGLES)
     if len(raw.faces) > MAX_TRIANGLES:
         notes.append(f"{len(raw.faces):,} triangles were thinned to {body.num_tri():,}")

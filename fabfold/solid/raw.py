@@ -46,6 +46,10 @@ class RawMesh:
         Whether the file stores coordinates in 32 bits.
     colours : (f, 3) uint8 array or None
         sRGB of each triangle, where the file has colours.
+    negative : ((v, 3) float64 array, (f, 3) int64 array) or None
+        Vertices and faces of what is taken away from the solid.
+    objects : tuple of str
+        Names of the objects that the file has, where it can have several.
     """
 
     vertices: NDArray[np.float64]
@@ -53,6 +57,8 @@ class RawMesh:
     notes: tuple[str, ...] = ()
     float32: bool = False
     colours: NDArray[np.uint8] | None = None
+    negative: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None
+    objects: tuple[str, ...] = ()
 
 
 def no_faces(name: str, found: str = "") -> ModelError:

@@ -1,4 +1,4 @@
-"""PLY, GLB and 3MF: checked for length first, then read by the libraries that know them."""
+"""PLY and GLB: checked for length first, then read by the library that knows them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fabfold.solid.paint import colours_of_mesh
 from fabfold.solid.ply_polygons import read_ply_polygons, triangles_only
 from fabfold.solid.raw import RawMesh, head_of, no_faces, what_is_it
 
-__all__ = ["read_3mf", "read_glb", "read_ply"]
+__all__ = ["read_glb", "read_ply"]
 
 _PLY_BYTES = {
     "char": 1, "uchar": 1, "int8": 1, "uint8": 1,
@@ -198,110 +198,3 @@ def _load_with_trimesh(path: Path, kind: str) -> Any:
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise no_faces(path.name)
     return mesh
-
-
-def read_3mf(path: Path) -> RawMesh:
-    """Read the build items of a 3MF file, each mesh placed by its transforms.
-
-    Parameters
-    ----------
-    path : Path
-        A file that is not empty.
-
-    Returns
-    -------
-    RawMesh
-        All meshes in one; with colours if each mesh has them.
-
-    Raises
-    ------
-    ModelError
-        If lib3mf cannot read the file, or nothing in it has triangles.
-    """
-    import lib3mf
-
-    head = head_of(path)
-    if head[:2] != b"PK":
-        raise ModelError(
-            f"{path.name} is not a 3MF file but {what_is_it(head)}; export the model as 3MF"
-        )
-    wrapper = lib3mf.get_wrapper()
-    model = wrapper.CreateModel()
-    parts: list[tuple[Any, Any, Any]] = []
-    try:
-        model.QueryReader("3mf").ReadFromFile(str(path))
-        items = model.GetBuildItems()
-        while items.MoveNext():
-            item = items.GetCurrent()
-            place = _affine(item.GetObjectTransform()) if item.HasObjectTransform() else np.eye(4)
-            _collect(model, item.GetObjectResource(), place, parts)
-    except lib3mf.ELib3MFException as error:
-        raise ModelError(
-            f"{path.name} cannot be read as 3MF ({str(error)[:160]}); export the model again"
-        ) from error
-    if not parts:
-        raise no_faces(path.name)
-    offsets = np.cumsum([0] + [len(part[0]) for part in parts])
-    faces = [part[1] + offset for part, offset in zip(parts, offsets, strict=False)]
-    return RawMesh(
-        np.concatenate([part[0] for part in parts]),
-        np.concatenate(faces),
-        float32=True,
-        colours=None if any(p[2] is None for p in parts) else np.concatenate([p[2] for p in parts]),
-    )
-
-
-def _affine(transform: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    matrix = np.eye(4)
-    matrix[:3, :] = np.array([list(row) for row in transform.Fields], dtype=float).T
-    return matrix
-
-
-def _triangle_colours(model: Any, mesh: Any) -> Any:
-    """Colour of each triangle of a 3MF mesh, from colour groups or base materials; else None."""
-    import lib3mf
-
-    plain, index, whole = mesh.GetObjectLevelProperty()
-    entries = [
-        (entry.ResourceID, entry.PropertyIDs[0]) for entry in mesh.GetAllTriangleProperties()
-    ]
-    if not whole and not any(group for group, _ in entries):
-        return None
-    shades: dict[tuple[int, int], tuple[int, int, int]] = {}
-    out = []
-    for entry in entries:
-        # A triangle without a property of its own has the object's.
-        group, number = entry if entry[0] else (plain, index)
-        if (group, number) not in shades:
-            shade = (255, 255, 255)
-            try:
-                kind = model.GetPropertyTypeByID(group)
-                if kind == lib3mf.PropertyType.BaseMaterial:
-                    colour = model.GetBaseMaterialGroupByID(group).GetDisplayColor(number)
-                    shade = (colour.Red, colour.Green, colour.Blue)
-                elif kind == lib3mf.PropertyType.Colors:
-                    colour = model.GetColorGroupByID(group).GetColor(number)
-                    shade = (colour.Red, colour.Green, colour.Blue)
-            except lib3mf.ELib3MFException:
-                pass  # no such property: as good as none
-            shades[group, number] = shade
-        out.append(shades[group, number])
-    return np.array(out, dtype=np.uint8).reshape(-1, 3)
-
-
-def _collect(model: Any, resource: Any, place: Any, parts: list[tuple[Any, Any, Any]]) -> None:
-    """Append the placed meshes of a 3MF object and of its components to `parts`."""
-    if resource.IsMeshObject():
-        if not resource.GetTriangleCount():
-            return
-        vertices = np.array([list(v.Coordinates) for v in resource.GetVertices()], dtype=float)
-        faces = np.array([list(t.Indices) for t in resource.GetTriangleIndices()], dtype=np.int64)
-        if np.linalg.det(place[:3, :3]) < 0:
-            faces = faces[:, ::-1]
-        moved = vertices @ place[:3, :3].T + place[:3, 3]
-        parts.append((moved, faces, _triangle_colours(model, resource)))
-    elif resource.IsComponentsObject():
-        for index in range(resource.GetComponentCount()):
-            component = resource.GetComponent(index)
-            own = _affine(component.GetTransform()) if component.HasTransform() else np.eye(4)
-            _collect(model, component.GetObjectResource(), place @ own, parts)

@@ -362,5 +362,5 @@ def _nearest(refinement: Refinement, found: Sequence[RefinedGrid], max_loss: flo
     return (
         f"no placement of the grid fits template {refinement.template.name} ({even} + {odd} cells "
         f"by checkerboard colour); the best has {nearest}. "
-        "Try a larger pitch or template, another seed, more placements, or a thicker model"
+        "Try a larger --pitch or --template, another --seed, or a thicker model"
     )
