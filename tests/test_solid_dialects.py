@@ -226,3 +226,15 @@ def test_pieces_that_stand_apart_say_by_how_much(tmp_path: Path) -> None:
     trimesh.util.concatenate(two).export(path)
     with pytest.raises(ModelError, match=r"apart, the two largest by 0\.005 in the model's units"):
         load_solid(path)
+
+
+def test_many_pieces_that_stand_apart_by_a_hair(tmp_path: Path) -> None:
+    import trimesh
+
+    box = trimesh.creation.box((1, 1, 1))
+    places = 1.001 * np.stack(np.meshgrid(*[np.arange(5)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    path = tmp_path / "cubes.stl"
+    trimesh.util.concatenate([box.copy().apply_translation(place) for place in places]).export(path)
+    solid = load_solid(path)
+    assert any(note.startswith("124 pieces were free of the body") for note in solid.notes)
+    assert 115 < volume(solid) < 125

@@ -74,18 +74,35 @@ def largest_piece(
 
 
 def _join(parts: list[manifold3d.Manifold]) -> tuple[manifold3d.Manifold, list[int]]:
-    """The first part with all that come as near to it as TOUCH_GAP; the indices of the others."""
-    body, loose = parts[0], list(range(1, len(parts)))
-    while True:
-        for index in loose:
-            if body.min_gap(parts[index], TOUCH_GAP) < TOUCH_GAP:
-                merged = body + _moved(parts[index], body)
-                if len(merged.decompose()) == 1:
-                    body = merged
-                    loose.remove(index)
-                    break
-        else:
-            return body, loose
+    """The first part with all that come as near to it as TOUCH_GAP; the indices of the others.
+
+    A part is moved to the one through which it is reached, and all are united at the end: each pair
+    of neighbours is looked at once.
+    """
+    import manifold3d
+
+    boxes = np.array([part.bounding_box() for part in parts]).reshape(-1, 2, 3)
+    free = np.ones(len(parts), dtype=bool)
+    free[0] = False
+    moved = {0: parts[0]}
+    reached = [0]
+    for index in reached:  # grows while it is walked through
+        low, high = boxes[index, 0] - TOUCH_GAP, boxes[index, 1] + TOUCH_GAP
+        near = free & (boxes[:, 0] <= high).all(axis=1) & (boxes[:, 1] >= low).all(axis=1)
+        for other in np.flatnonzero(near).tolist():
+            if parts[index].min_gap(parts[other], TOUCH_GAP) >= TOUCH_GAP:
+                continue
+            part = _moved(parts[other], moved[index])
+            if len((moved[index] + part).decompose()) == 1:
+                moved[other] = part
+                free[other] = False
+                reached.append(other)
+    if len(reached) == 1:
+        return parts[0], np.flatnonzero(free).tolist()
+    body = manifold3d.Manifold.batch_boolean(
+        [moved[index] for index in reached], manifold3d.OpType.Add
+    )
+    return body, np.flatnonzero(free).tolist()
 
 
 def _moved(part: manifold3d.Manifold, body: manifold3d.Manifold) -> manifold3d.Manifold:
