@@ -61,7 +61,9 @@ def sliced(path: Path, bed: float) -> dict[str, Any]:
 
 def row_of(folder: Path, slicing: bool) -> dict[str, Any]:
     """One kit: pins, plates, seconds of each step, and what the slicer says."""
-    planned = open_kit(str(folder)).fold()
+    kit = open_kit(str(folder))
+    # A kit that was printed apart has the tree whose pins go in; one printed in place, the best.
+    planned = kit.join().planned if kit.print_mode().apart else kit.fold()
     tree, motion = planned.tree, planned.motion
     mode = print_mode(load_profile("fdm-pla-0.4"))
     fit, seconds = mode.profile.apart, {}

@@ -7,15 +7,11 @@ from typing import TYPE_CHECKING, Literal
 
 from build123d import (
     Align,
-    Axis,
-    BasePartObject,
     Color,
     Location,
     Mode,
     Part,
     Plane,
-    RevoluteJoint,
-    RigidJoint,
     Rotation,
     Solid,
 )
@@ -26,6 +22,14 @@ from .exceptions import HingeError
 from .leaf import Bracket
 from .options import BoreStyle
 from .pins import Pin
+from .placement import (
+    HingedPart,
+    PlacedPart,
+    add_joint,
+    keep_joints,
+    outside_builders,
+    require_free_joint,
+)
 from .plan_double import (
     DoublePlan,
     DoubleSpec,
@@ -35,7 +39,6 @@ from .plan_double import (
     plan_double,
 )
 from .shapes import HalfPlan
-from .single import keep_joints
 
 if TYPE_CHECKING:
     from build123d import RotationLike
@@ -87,7 +90,7 @@ def _pose(spec: DoubleSpec, body: BodyName) -> Location:
     return _location(link_pose(spec, first) if body == "link" else child_pose(spec, first, second))
 
 
-class DoubleHinge(BasePartObject):  # type: ignore[misc]
+class DoubleHinge(PlacedPart):
     """Two boxes joined by a link plate that turns on both: three bodies, two axes.
 
     The shared face is the square |y|, |z| ≤ size / 2 of the plane x = 0; the parent's box lies at
@@ -195,7 +198,7 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
         super().__init__(part=self._built(), rotation=rotation, align=align, mode=mode)
         self.label = "double hinge"
         self.color = Color(*COLORS["parent"])
-        RigidJoint("parent", self, Location())
+        self._bind("parent", Location())
 
     def _built(self) -> Part:
         """All three bodies in the drawn pose."""
@@ -212,39 +215,49 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
         """Every shape of the hinge as data."""
         return plan_double(self.spec)
 
+    def _body(self, body: BodyName) -> Part:
+        return self._like(outside_builders(lambda: DoubleHingePart(self, body)))
+
+    def _carved(self, body: BodyName) -> Part:
+        return self._like(outside_builders(lambda: DoubleHingeCarve(self, body)))
+
     @property
     def parent_half(self) -> Part:
         """The parent's knuckles and bracket; its joint "link" turns."""
-        return DoubleHingePart(self, "parent", mode=Mode.PRIVATE)
+        return self._body("parent")
 
     @property
     def link(self) -> Part:
         """The link plate; its joint "parent" is rigid, its joint "child" turns."""
-        return DoubleHingePart(self, "link", mode=Mode.PRIVATE)
+        return self._body("link")
 
     @property
     def child_half(self) -> Part:
         """The child's knuckles and bracket in the drawn pose; its joint "link" is rigid."""
-        return DoubleHingePart(self, "child", mode=Mode.PRIVATE)
+        return self._body("child")
 
     @property
     def parent_carve(self) -> Part:
         """What the parent's body gives up: grooves, and pockets for the link plate."""
-        return DoubleHingeCarve(self, "parent", mode=Mode.PRIVATE)
+        return self._carved("parent")
 
     @property
     def child_carve(self) -> Part:
         """What the child's body, in the drawn pose, gives up."""
-        return DoubleHingeCarve(self, "child", mode=Mode.PRIVATE)
+        return self._carved("child")
 
     @property
     def hardware(self) -> Part | None:
         """The loose pins in the pose with both angles 0, or None for printed ones."""
         loose = self.plan.loose
-        return one_part([build_shape(shape) for shape in loose]) if loose else None
+        return self._like(one_part([build_shape(shape) for shape in loose])) if loose else None
 
     def fit(
-        self, parent: Part | Solid, child: Part | Solid, at: Location | Plane | None = None
+        self,
+        parent: Part | Solid,
+        child: Part | Solid,
+        at: Location | Plane | None = None,
+        joint: str = "link",
     ) -> tuple[Part, Part, Part]:
         """Let the hinge into two bodies.
 
@@ -254,7 +267,9 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
             The bodies in the drawn pose. Each keeps at least half the gap inside its box: away
             from the face that they share, and from the faces that they fold together on.
         at : Location or Plane, optional
-            Where the hinge's frame lies.
+            Where the hinge lies; where it is when left out.
+        joint : str
+            Name of the joints on both bodies; for a body with several hinges, as in a chain.
 
         Returns
         -------
@@ -265,15 +280,16 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
         Raises
         ------
         HingeError
-            If a body does not come out in one piece.
+            If a body does not come out in one piece, or has a joint of that name.
         """
         place = at.location if isinstance(at, Plane) else (at or Location())
+        require_free_joint((("parent", parent), ("child", child)), joint)
         made = []
         for name, body in (("parent", parent), ("child", child)):
-            half = DoubleHingePart(self, _body(name), mode=Mode.PRIVATE).moved(place)
-            carve = DoubleHingeCarve(self, _body(name), mode=Mode.PRIVATE).moved(place)
+            half = self._body(_body(name)).moved(place)
+            carve = self._carved(_body(name)).moved(place)
             solids = solids_of(solids_of(body)[0].cut(*carve.solids()))
-            fitted = one_part(solids_of(solids[0].fuse(*solids[1:], *half.solids())))
+            fitted = HingedPart(solids_of(solids[0].fuse(*solids[1:], *half.solids())))
             if len(fitted.solids()) != 1:
                 raise HingeError(
                     f"the {name} body came out in {len(fitted.solids())} pieces: it must reach the "
@@ -283,38 +299,40 @@ class DoubleHinge(BasePartObject):  # type: ignore[misc]
             fitted.color = body.color
             keep_joints(body, fitted)
             made.append(fitted)
-        link = one_part([self.link.moved(place).solid()])
+        link = HingedPart([self.link.moved(place).solid()])
         link.label, link.color = "link", Color(*COLORS["link"])
-        _add_joints(self.spec, made[0], "parent", place)
-        _add_joints(self.spec, link, "link", place)
-        _add_joints(self.spec, made[1], "child", place)
+        frame = place * self.place
+        for part, name in ((made[0], "parent"), (link, "link"), (made[1], "child")):
+            for label, at_joint, turns in _joints(self.spec, _body(name), joint):
+                add_joint(label, part, frame * at_joint, turns)
         return made[0], link, made[1]
 
 
-def _add_joints(spec: DoubleSpec, part: Part, body: BodyName, place: Location) -> None:
-    """Put the joints of one body on the true axes, in the drawn pose."""
+def _joints(
+    spec: DoubleSpec, body: BodyName, label: str = "link"
+) -> list[tuple[str, Location, tuple[float, float] | None]]:
+    """Joints of one body in the drawn pose: name, frame on its axis, and range where it turns."""
     first, second = spec.angles
-    at_link = place * _location(link_pose(spec, first))
-    axes = []
-    for axis, pose in ((0, place), (1, at_link)):
+    frames = []
+    for axis, pose in ((0, Location()), (1, _location(link_pose(spec, first)))):
         frame = spec.frame(axis)
         if axis:  # the child turns about the link's own direction of the edge
             frame = frame.copy()
             frame[:3, 0] *= -1.0
             frame[:3, 2] *= -1.0
-        plane = Plane(pose * _location(frame))
-        axes.append(Axis(plane.origin, plane.z_dir))
-    ranges = [(0.0, turn) for turn in spec.turns]
+        frames.append(pose * _location(frame))
+    ranges = [(0.0, float(turn)) for turn in spec.turns]
     if body == "parent":
-        RevoluteJoint("link", part, axis=axes[0], angular_range=ranges[0])
-    elif body == "link":
-        RigidJoint("parent", part, axes[0].location * Rotation(0, 0, first))
-        RevoluteJoint("child", part, axis=axes[1], angular_range=ranges[1])
-    else:
-        RigidJoint("link", part, axes[1].location * Rotation(0, 0, second))
+        return [(label, frames[0], ranges[0])]
+    if body == "link":
+        return [
+            ("parent", frames[0] * Rotation(0, 0, first), None),
+            ("child", frames[1], ranges[1]),
+        ]
+    return [(label, frames[1] * Rotation(0, 0, second), None)]
 
 
-class DoubleHingePart(BasePartObject):  # type: ignore[misc]
+class DoubleHingePart(PlacedPart):
     """One body of a double hinge: the parent's half, the link, or the child's half.
 
     Parameters
@@ -340,10 +358,11 @@ class DoubleHingePart(BasePartObject):  # type: ignore[misc]
         super().__init__(part=part, rotation=rotation, align=align, mode=mode)
         self.label = "link" if body == "link" else f"{body} half"
         self.color = Color(*COLORS[body])
-        _add_joints(hinge.spec, self, body, Location())
+        for label, frame, turns in _joints(hinge.spec, body):
+            self._bind(label, frame, turns)
 
 
-class DoubleHingeCarve(BasePartObject):  # type: ignore[misc]
+class DoubleHingeCarve(PlacedPart):
     """What a body gives up to a double hinge.
 
     Parameters

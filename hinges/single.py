@@ -7,15 +7,11 @@ from typing import TYPE_CHECKING, Literal
 
 from build123d import (
     Align,
-    Axis,
-    BasePartObject,
     Color,
     Location,
     Mode,
     Part,
     Plane,
-    RevoluteJoint,
-    RigidJoint,
     Rotation,
     Solid,
 )
@@ -26,6 +22,15 @@ from .exceptions import HingeError
 from .leaf import Bracket, Leaf
 from .options import BoreStyle
 from .pins import Pin
+from .placement import (
+    FixedJoint,
+    HingedPart,
+    HingeJoint,
+    PlacedPart,
+    keep_joints,
+    outside_builders,
+    require_free_joint,
+)
 from .plan_single import SinglePlan, SingleSpec, plan_single
 from .stops import Detents, Stops
 
@@ -94,7 +99,7 @@ def hinge_location(origin: VectorLike, along: VectorLike, outwards: VectorLike) 
     return Plane(origin=origin, x_dir=y_dir.cross(z_dir), z_dir=z_dir).location
 
 
-class SingleHinge(BasePartObject):  # type: ignore[misc]
+class SingleHinge(PlacedPart):
     """A print-in-place or pinned hinge on one axis: two halves that turn about z.
 
     The axis is z through the origin, with the hinge centred on it. At angle 0 the parent's
@@ -217,13 +222,8 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
         super().__init__(part=self._built(), rotation=rotation, align=align, mode=mode)
         self.label = "hinge"
         self.color = Color(*PARENT_COLOR)
-        RevoluteJoint("hinge", self, axis=self._axis(), angular_range=self.spec.angular_range)
-        RigidJoint("parent", self, Location())
-
-    def _axis(self) -> Axis:
-        turned = Rotation(*self.rotation) if isinstance(self.rotation, tuple) else self.rotation
-        plane = Plane(Location() * turned)
-        return Axis(plane.origin, plane.z_dir)
+        self._bind("hinge", Location(), self.spec.angular_range)
+        self._bind("parent", Location())
 
     def _built(self) -> Part:
         """Both halves in the drawn pose."""
@@ -239,25 +239,31 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
         """Every shape of the hinge as data."""
         return plan_single(self.spec)
 
+    def _half(self, side: Side) -> Part:
+        return self._like(outside_builders(lambda: HingeHalf(self, side)))
+
+    def _carved(self, side: Side) -> Part:
+        return self._like(outside_builders(lambda: HingeCarve(self, side)))
+
     @property
     def parent_half(self) -> Part:
         """The parent's knuckles and bracket; its joint "hinge" turns."""
-        return HingeHalf(self, "parent", mode=Mode.PRIVATE)
+        return self._half("parent")
 
     @property
     def child_half(self) -> Part:
         """The child's knuckles and bracket in the drawn pose; its joint "hinge" is rigid."""
-        return HingeHalf(self, "child", mode=Mode.PRIVATE)
+        return self._half("child")
 
     @property
     def parent_carve(self) -> Part:
         """What the parent's body gives up before its half is added."""
-        return HingeCarve(self, "parent", mode=Mode.PRIVATE)
+        return self._carved("parent")
 
     @property
     def child_carve(self) -> Part:
         """What the child's body, in the drawn pose, gives up before its half is added."""
-        return HingeCarve(self, "child", mode=Mode.PRIVATE)
+        return self._carved("child")
 
     @property
     def hardware(self) -> Part | None:
@@ -265,7 +271,7 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
         loose = self.plan.loose
         if not loose:
             return None
-        drawn = one_part([build_shape(shape) for shape in loose])
+        drawn = self._like(one_part([build_shape(shape) for shape in loose]))
         drawn.label = "hardware"
         return drawn
 
@@ -284,7 +290,7 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
             The bodies in the drawn pose. Each keeps at least half the gap inside its quadrant:
             away from the face that they share, and from the one that they fold together on.
         at : Location or Plane, optional
-            Where the hinge's frame lies; see :func:`hinge_location`.
+            Where the hinge lies, see :func:`hinge_location`; where it is when left out.
         joint : str
             Name of the joints on both bodies; for a body with several hinges.
 
@@ -297,15 +303,17 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
         Raises
         ------
         HingeError
-            If a body does not come out in one piece, because it does not meet its half.
+            If a body does not come out in one piece, because it does not meet its half; or has a
+            joint of that name.
         """
         place = at.location if isinstance(at, Plane) else (at or Location())
+        require_free_joint((("parent", parent), ("child", child)), joint)
         made = []
         for side, body in (("parent", parent), ("child", child)):
-            half = HingeHalf(self, _side(side), mode=Mode.PRIVATE).moved(place)
-            carve = HingeCarve(self, _side(side), mode=Mode.PRIVATE).moved(place)
+            half = self._half(_side(side)).moved(place)
+            carve = self._carved(_side(side)).moved(place)
             solids = solids_of(solids_of(body)[0].cut(*carve.solids()))
-            fitted = one_part(solids_of(solids[0].fuse(*solids[1:], *half.solids())))
+            fitted = HingedPart(solids_of(solids[0].fuse(*solids[1:], *half.solids())))
             if len(fitted.solids()) != len(solids_of(body)):
                 raise HingeError(
                     f"the {side} body came out in {len(fitted.solids())} pieces: it must reach the "
@@ -315,33 +323,13 @@ class SingleHinge(BasePartObject):  # type: ignore[misc]
             fitted.color = body.color
             keep_joints(body, fitted)
             made.append(fitted)
-        plane = Plane(place)
-        axis = Axis(plane.origin, plane.z_dir)
-        turning = RevoluteJoint(joint, made[0], axis=axis, angular_range=self.spec.angular_range)
-        RigidJoint(joint, made[1], turning.relative_axis.location * Rotation(0, 0, self.spec.angle))
+        frame = place * self.place
+        HingeJoint(joint, made[0], frame, self.spec.angular_range)
+        FixedJoint(joint, made[1], frame * Rotation(0, 0, self.spec.angle))
         return made[0], made[1]
 
 
-def keep_joints(body: Part | Solid, fitted: Part) -> None:
-    """Bind copies of a body's rigid and revolute joints to the part that it became.
-
-    Parameters
-    ----------
-    body : Part or Solid
-        The body as it was.
-    fitted : Part
-        The body with its half of the hinge.
-    """
-    for label, joint in body.joints.items():
-        if isinstance(joint, RigidJoint):
-            RigidJoint(label, fitted, joint.location)
-        elif isinstance(joint, RevoluteJoint):
-            plane = Plane(joint.location)
-            axis = Axis(plane.origin, plane.z_dir)
-            RevoluteJoint(label, fitted, axis=axis, angular_range=joint.angular_range)
-
-
-class HingeHalf(BasePartObject):  # type: ignore[misc]
+class HingeHalf(PlacedPart):
     """One half of a hinge, to add to its body after :class:`HingeCarve` was cut from it.
 
     Parameters
@@ -368,13 +356,12 @@ class HingeHalf(BasePartObject):  # type: ignore[misc]
         self.label = f"{side} half"
         self.color = Color(*(PARENT_COLOR if side == "parent" else CHILD_COLOR))
         if side == "parent":
-            RevoluteJoint("hinge", self, axis=Axis.Z, angular_range=hinge.spec.angular_range)
+            self._bind("hinge", Location(), hinge.spec.angular_range)
         else:
-            frame = Axis.Z.location * Rotation(0, 0, hinge.spec.angle)
-            RigidJoint("hinge", self, frame)
+            self._bind("hinge", Rotation(0, 0, hinge.spec.angle))
 
 
-class HingeCarve(BasePartObject):  # type: ignore[misc]
+class HingeCarve(PlacedPart):
     """What a body gives up to a hinge: grooves for the other half's knuckles, and its own bores.
 
     Parameters
