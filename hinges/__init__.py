@@ -12,7 +12,42 @@ heavy is imported until it is used.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    # For editors and type checkers; when it runs, names are imported on first use.
+    from .clearance import Clearance as Clearance
+    from .double import DoubleHinge as DoubleHinge
+    from .double import DoubleHingeCarve as DoubleHingeCarve
+    from .double import DoubleHingePart as DoubleHingePart
+    from .exceptions import FitError as FitError
+    from .exceptions import HingeError as HingeError
+    from .exceptions import KernelError as KernelError
+    from .hardware import FilamentPin as FilamentPin
+    from .hardware import RodPin as RodPin
+    from .hardware import ScrewPin as ScrewPin
+    from .joint_play import Play as Play
+    from .joint_play import play as play
+    from .joint_play import total_play as total_play
+    from .leaf import Bracket as Bracket
+    from .leaf import Leaf as Leaf
+    from .printed_pins import ConePin as ConePin
+    from .printed_pins import StraightPin as StraightPin
+    from .retention import Magnet as Magnet
+    from .retention import MagnetPocket as MagnetPocket
+    from .retention import SnapDimple as SnapDimple
+    from .retention import SnapSpec as SnapSpec
+    from .retention import SnapTongue as SnapTongue
+    from .single import HingeCarve as HingeCarve
+    from .single import HingeHalf as HingeHalf
+    from .single import SingleHinge as SingleHinge
+    from .single import hinge_location as hinge_location
+    from .stops import Detents as Detents
+    from .stops import Stops as Stops
+    from .tolerance_coupon import Coupon as Coupon
+    from .tolerance_coupon import write_coupon as write_coupon
 
 #: The module that each public name lives in.
 _HOMES = {

@@ -7,12 +7,20 @@ from math import floor
 
 from .clearance import PROCESSES, Clearance
 from .exceptions import HingeError
+from .fit import at_least
 from .knuckles import lay_out_knuckles
 from .options import BarrelOptions
 from .pins import BoreForm, Pin
 from .printed_pins import ConePin
 
-__all__ = ["BarrelSpec", "barrel_spec", "default_pin_radius", "default_radii", "wall_of"]
+__all__ = [
+    "BarrelSpec",
+    "barrel_spec",
+    "check_gap",
+    "default_pin_radius",
+    "default_radii",
+    "wall_of",
+]
 
 DEFAULT_WALL = 0.8
 
@@ -103,6 +111,29 @@ def barrel_spec(
         wall=wall,
         bore_form=BoreForm(options.bore, tuple(options.up - angle for angle in drawn)),
     )
+
+
+def check_gap(spec: BarrelSpec) -> None:
+    """Refuse bodies that lie nearer to one another than what moves in their hinge.
+
+    Parameters
+    ----------
+    spec : BarrelSpec
+        Sizes of the hinge.
+
+    Raises
+    ------
+    FitError
+        If the hinge is printed as a whole, where such bodies fuse.
+    """
+    if spec.pin.printed:
+        at_least(
+            "gap",
+            "the gap between two bodies that are printed together",
+            spec.gap,
+            spec.clearance.least,
+            "use a larger gap, or a loose pin and print the bodies apart",
+        )
 
 
 def wall_of(clearance: Clearance | float | str) -> float:

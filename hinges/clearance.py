@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from math import isfinite, nan
 from typing import Final
 
 from .exceptions import HingeError
 
 __all__ = ["PROCESSES", "Clearance", "Process", "millimetres"]
 
+#: Smallest clearance in mm: resin printers hold a few hundredths at best.
+LEAST: Final = 0.05
 _UNITS: Final[dict[str, float]] = {
     "mm": 1.0,
     "um": 0.001,
@@ -30,13 +33,44 @@ _LENGTH: Final = re.compile(
 )
 
 
-def millimetres(value: float | str) -> float:
+def number(value: object, name: str) -> float:
+    """Read a number, and refuse what is none.
+
+    Parameters
+    ----------
+    value : object
+        What was given.
+    name : str
+        What it is, for the message.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    HingeError
+        If it is no finite number.
+    """
+    try:
+        read = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        read = nan
+    if isinstance(value, (bool, str)) or not isfinite(read):
+        raise HingeError(f"{name} is {value!r}: give a finite number")
+    return read
+
+
+def millimetres(value: float | str, name: str = "length") -> float:
     """Read a length: a number is in mm, a text may name its unit.
 
     Parameters
     ----------
     value : float or str
         The length: ``0.3``, ``"0.3 mm"``, ``"300 um"``, ``"12 thou"`` or ``"0.012 in"``.
+    name : str
+        What it is, for messages.
 
     Returns
     -------
@@ -56,12 +90,12 @@ def millimetres(value: float | str) -> float:
     0.3048
     """
     if not isinstance(value, str):
-        return float(value)
+        return number(value, name)
     found = _LENGTH.match(value)
     unit = found.group(2).lower() or "mm" if found else ""
     if found is None or unit not in _UNITS:
         known = ", ".join(name for name in _UNITS if name not in ('"', "μm"))
-        raise HingeError(f"length {value!r} cannot be read: write a number and one of {known}")
+        raise HingeError(f"{name} {value!r} cannot be read: write a number and one of {known}")
     return round(float(found.group(1)) * _UNITS[unit], 12)
 
 
@@ -97,8 +131,8 @@ PROCESSES: Final[dict[str, Process]] = {
     for process in (
         Process(
             "fdm",
-            0.30,
-            0.30,
+            0.40,
+            0.40,
             0.30,
             0.50,
             0.80,
@@ -107,8 +141,8 @@ PROCESSES: Final[dict[str, Process]] = {
         ),
         Process(
             "sla",
-            0.25,
-            0.25,
+            0.30,
+            0.30,
             0.20,
             0.30,
             0.60,
@@ -164,7 +198,7 @@ class Clearance:
     Raises
     ------
     HingeError
-        If a value is not a finite positive length, or above 5 mm.
+        If a value is not a length of 0.05 to 5 mm.
 
     Examples
     --------
@@ -181,12 +215,13 @@ class Clearance:
     def __init__(
         self, radial: float | str, axial: float | str | None = None, source: str = "given"
     ) -> None:
-        across = millimetres(radial)
-        along = across if axial is None else millimetres(axial)
+        across = millimetres(radial, "radial clearance")
+        along = across if axial is None else millimetres(axial, "axial clearance")
         for name, value in (("radial", across), ("axial", along)):
-            if not 0.0 < value <= 5.0:
+            if not LEAST <= value <= 5.0:
                 raise HingeError(
-                    f"{name} clearance is {value} mm: give a length above 0 and up to 5 mm"
+                    f"{name} clearance is {value:g} mm: give {LEAST:g} to 5 mm; with less no "
+                    "printer keeps surfaces apart"
                 )
         object.__setattr__(self, "radial", across)
         object.__setattr__(self, "axial", along)

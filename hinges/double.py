@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from build123d import (
     Align,
@@ -13,6 +13,7 @@ from build123d import (
     Part,
     Plane,
     Rotation,
+    RotationLike,
     Solid,
 )
 
@@ -20,7 +21,7 @@ from .clearance import Clearance
 from .exact_solids import build_all, build_half, build_shape, one_part, solids_of
 from .exceptions import HingeError
 from .leaf import Bracket
-from .options import BoreStyle
+from .options import BoreStyle, DoubleHingeKeywords, DoubleHingeOptions, call_of
 from .pins import Pin
 from .placement import (
     HingedPart,
@@ -39,9 +40,6 @@ from .plan_double import (
     plan_double,
 )
 from .shapes import HalfPlan
-
-if TYPE_CHECKING:
-    from build123d import RotationLike
 
 __all__ = ["DoubleHinge", "DoubleHingeCarve", "DoubleHingePart"]
 
@@ -101,8 +99,8 @@ class DoubleHinge(PlacedPart):
 
     Parameters
     ----------
-    size : float
-        Side of the shared face in mm.
+    size : float or str
+        Side of the shared face: in mm, or with a unit such as "2 in".
     first, second : {"+y", "-y", "+z", "-z"}
         Edges of the parent-link and of the link-child axis.
     turns : (float, float)
@@ -153,7 +151,7 @@ class DoubleHinge(PlacedPart):
 
     def __init__(
         self,
-        size: float,
+        size: float | str,
         *,
         first: str = "+y",
         second: str = "-y",
@@ -175,25 +173,26 @@ class DoubleHinge(PlacedPart):
         align: Align | tuple[Align, Align, Align] | None = None,
         mode: Mode = Mode.ADD,
     ) -> None:
-        self.spec = DoubleSpec.read(
-            size,
-            first=first,
-            second=second,
-            turns=turns,
-            angles=angles,
-            knuckles=knuckles,
-            radius=radius,
-            pin=pin,
-            clearance=clearance,
-            plate=plate,
-            bracket=bracket,
-            gap=gap,
-            chamfer=chamfer,
-            margin=margin,
-            wall=wall,
-            bore=bore,
-            up=up,
-        )
+        asked: DoubleHingeKeywords = {
+            "first": first,
+            "second": second,
+            "turns": turns,
+            "angles": angles,
+            "knuckles": knuckles,
+            "radius": radius,
+            "pin": pin,
+            "clearance": clearance,
+            "plate": plate,
+            "bracket": bracket,
+            "gap": gap,
+            "chamfer": chamfer,
+            "margin": margin,
+            "wall": wall,
+            "bore": bore,
+            "up": up,
+        }
+        self.spec = DoubleSpec.read(size, **asked)
+        self._asked = (size, asked)
         plan_double(self.spec)
         super().__init__(part=self._built(), rotation=rotation, align=align, mode=mode)
         self.label = "double hinge"
@@ -209,6 +208,10 @@ class DoubleHinge(PlacedPart):
                 for body in bodies
             ]
         )
+
+    def __repr__(self) -> str:
+        """The call that makes this hinge, without what is left at its default."""
+        return call_of("DoubleHinge", *self._asked, DoubleHingeOptions())
 
     @property
     def plan(self) -> DoublePlan:

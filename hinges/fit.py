@@ -15,6 +15,7 @@ rule            what it asks for
 ``pose``        the pose that is drawn keeps the clearance to the stops and sits at a detent
 ``stop``        a stop that has something to lean on
 ``detent``      a bump that fits the end face of a barrel
+``gap``         bodies printed together no nearer than what moves in their hinge
 ``plate``       a link plate thick and wide enough to carry both rows of knuckles
 ``strain``      a spring stays below the strain that its material bears again and again
 ==============  ================================================================================
@@ -41,6 +42,7 @@ RULES: Final[tuple[str, ...]] = (
     "pose",
     "stop",
     "detent",
+    "gap",
     "plate",
     "strain",
 )

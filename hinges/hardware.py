@@ -194,8 +194,9 @@ class LoosePin(Pin):
         """Both ends of every bore; the pin's room on both sides counts."""
         return loose_pin_contacts(layout, 0.5 * self.diameter, self.grip + self.slip)
 
-    def hardware(self, layout: KnuckleLayout) -> tuple[Shape, ...]:
+    def hardware(self, layout: KnuckleLayout, bore_form: BoreForm) -> tuple[Shape, ...]:
         """Draw the pin."""
+        del bore_form
         return (cylinder(0.5 * self.diameter, layout.start, layout.end),)
 
 
@@ -378,11 +379,15 @@ class ScrewPin(Pin):
 
     def insertion_cuts(self, layout: KnuckleLayout, edge: float) -> tuple[Shape, ...]:
         """Clear both bodies for the head, and for the nut at the other end."""
-        wide = 0.5 * (self.screw.cap if self.head == "cylinder" else self.screw.sunk) + self._ROOM
-        ends = [(wide, layout.start, -max(edge, -layout.start + self._proud(head=True)))]
+        # Head and nut turn with one half, beside the bracket of the other.
+        room = max(self._ROOM, layout.clearance.radial)
+        over = 0.0 if self.sunk else layout.clearance.axial
+        wide = 0.5 * (self.screw.cap if self.head == "cylinder" else self.screw.sunk) + room
+        ends = [(wide, layout.start + over, -max(edge, -layout.start + self._proud(head=True)))]
         if self.end == "nut":
             far = max(edge, layout.end + self._proud(head=False))
-            ends.append((self._nut_radius, layout.end, far))
+            wide = max(self._nut_radius, 0.5 * self.screw.nut / cos(radians(30.0)) + room)
+            ends.append((wide, layout.end - over, far))
         return tuple(
             cylinder(radius, *sorted((near, far)))
             for radius, near, far in ends
@@ -399,8 +404,8 @@ class ScrewPin(Pin):
         radius = 0.5 * self.screw.diameter
         return loose_pin_contacts(layout, radius, 2.0 * (0.5 * self.screw.clear - radius))
 
-    def hardware(self, layout: KnuckleLayout) -> tuple[Shape, ...]:
-        """Draw the screw, and its nut."""
+    def hardware(self, layout: KnuckleLayout, bore_form: BoreForm) -> tuple[Shape, ...]:
+        """Draw the screw, and its nut as its pocket lies in the drawn pose."""
         screw = self.screw
         radius = 0.5 * screw.diameter
         base = layout.start
@@ -425,5 +430,6 @@ class ScrewPin(Pin):
         drawn: list[Shape] = [Turned(outline)]
         if self.end == "nut":
             start = layout.end - (screw.nut_height if self.sunk else 0.0)
-            drawn.append(regular(6, screw.nut, start, start + screw.nut_height, 0.0))
+            turn = bore_form.up[0]
+            drawn.append(regular(6, screw.nut, start, start + screw.nut_height, turn))
         return tuple(drawn)

@@ -7,10 +7,12 @@ means is told in :class:`hinges.SingleHinge` and :class:`hinges.DoubleHinge`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypedDict
 
-from .clearance import Clearance
+from .clearance import Clearance, number
+from .exceptions import HingeError
 from .hardware import LoosePin
 from .leaf import Bracket, Leaf
 from .pins import Pin
@@ -26,6 +28,7 @@ __all__ = [
     "MeshOptions",
     "SingleHingeKeywords",
     "SingleHingeOptions",
+    "call_of",
 ]
 
 BoreStyle = Literal["round", "teardrop", "octagon"]
@@ -59,6 +62,33 @@ class BarrelOptions:
     bore: BoreStyle = "round"
     up: float = 90.0
 
+    def __post_init__(self) -> None:
+        """Refuse what is no pin, no number or no size."""
+        if isinstance(self.pin, type):
+            name = self.pin.__name__
+            raise HingeError(f"pin is the class {name}: make one of it, such as pin={name}(...)")
+        if self.pin is not None and not isinstance(self.pin, Pin):
+            raise HingeError(
+                f"pin is {self.pin!r}: give a pin, such as ConePin(1.2), FilamentPin(), RodPin(2) "
+                'or ScrewPin("M3")'
+            )
+        above = {"radius": self.radius, "gap": self.gap, "wall": self.wall}
+        for name, value in {**above, "chamfer": self.chamfer, "margin": self.margin}.items():
+            if value is None:
+                continue
+            if number(value, name) < 0.0 or (name in above and value == 0.0):
+                least = "above 0" if name in above else "of 0 or more"
+                raise HingeError(f"{name} is {value:g} mm: give a length {least}")
+        number(self.up, "up")
+
+
+def _require_pair(value: object, name: str, words: str) -> None:
+    """Refuse what are not two numbers."""
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise HingeError(f"{name} is {value!r}: give {words}")
+    for each in value:
+        number(each, name)
+
 
 class SingleHingeKeywords(BarrelKeywords, total=False):
     """Keywords of a single hinge."""
@@ -81,6 +111,22 @@ class SingleHingeOptions(BarrelOptions):
     angular_range: tuple[float, float] = (0.0, 180.0)
     stops: Stops | bool | None = None
     detents: Detents | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no angle, no range, no leaf, no stops and no detents."""
+        super().__post_init__()
+        number(self.angle, "angle")
+        words = "the lowest and the highest angle in degrees, such as (0, 110)"
+        _require_pair(self.angular_range, "angular_range", words)
+        if self.stops is not None and not isinstance(self.stops, (Stops, bool)):
+            raise HingeError(
+                f"stops is {self.stops!r}: give True or Stops(...); the angle at which a stop "
+                "stands is an end of angular_range, such as angular_range=(0, 110)"
+            )
+        if self.detents is not None and not isinstance(self.detents, Detents):
+            raise HingeError(f"detents is {self.detents!r}: give Detents((0, 90)) or the like")
+        if self.leaf is not None and not isinstance(self.leaf, (Bracket, Leaf)):
+            raise HingeError(f"leaf is {self.leaf!r}: give Bracket(...) or Leaf(...)")
 
 
 class DoubleHingeKeywords(BarrelKeywords, total=False):
@@ -106,6 +152,16 @@ class DoubleHingeOptions(BarrelOptions):
     knuckles: int | None = None
     plate: float | None = None
     bracket: Bracket | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no angle and no bracket."""
+        super().__post_init__()
+        _require_pair(self.turns, "turns", "how far each axis turns in degrees, such as (180, 90)")
+        _require_pair(self.angles, "angles", "the angles of both axes in degrees, such as (0, 0)")
+        if self.plate is not None and number(self.plate, "plate") <= 0.0:
+            raise HingeError(f"plate is {self.plate:g} mm: give a length above 0")
+        if self.bracket is not None and not isinstance(self.bracket, Bracket):
+            raise HingeError(f"bracket is {self.bracket!r}: give Bracket(...)")
 
 
 class MeshKeywords(TypedDict, total=False):
@@ -158,3 +214,27 @@ class MeshOptions:
     wall_mm: float = 0.8
     segments: int = 64
     pin: LoosePin | None = None
+
+
+def call_of(name: str, size: object, asked: Mapping[str, object], options: BarrelOptions) -> str:
+    """Write the call that makes a hinge.
+
+    Parameters
+    ----------
+    name : str
+        Name of the class.
+    size : object
+        Its first argument.
+    asked : mapping
+        Its keywords.
+    options : BarrelOptions
+        The defaults; a keyword at its default is left out.
+
+    Returns
+    -------
+    str
+        Python source, as long as the values' own are.
+    """
+    defaults = vars(options)
+    more = [f"{key}={value!r}" for key, value in asked.items() if value != defaults[key]]
+    return f"{name}({', '.join([repr(size), *more])})"

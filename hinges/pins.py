@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import cos, radians
-from typing import Literal
+from typing import ClassVar, Literal
 
 from .clearance import Clearance
 from .exceptions import HingeError
@@ -96,7 +96,15 @@ class ContactCircle:
 
 
 class Pin(ABC):
-    """What every kind of pin tells the hinge."""
+    """What every kind of pin tells the hinge.
+
+    Attributes
+    ----------
+    printed : bool
+        Whether it grows on its knuckles, so that all bodies are printed together.
+    """
+
+    printed: ClassVar[bool] = False
 
     @abstractmethod
     def largest_radius(self, layout: KnuckleLayout, bore_form: BoreForm) -> float:
@@ -221,20 +229,22 @@ class Pin(ABC):
         del layout, edge
         return ()
 
-    def hardware(self, layout: KnuckleLayout) -> tuple[Shape, ...]:
+    def hardware(self, layout: KnuckleLayout, bore_form: BoreForm) -> tuple[Shape, ...]:
         """Draw the loose pin itself.
 
         Parameters
         ----------
         layout : KnuckleLayout
             The knuckles of the axis.
+        bore_form : BoreForm
+            How bores are closed above; pockets of nuts lie by it.
 
         Returns
         -------
         tuple of Shape
             Pin, screw and nut in their places; empty for a printed pin.
         """
-        del layout
+        del layout, bore_form
         return ()
 
     def _check_common(self, layout: KnuckleLayout, wall: float, bore_form: BoreForm) -> None:

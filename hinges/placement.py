@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextvars import Context
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from build123d import (
     Align,
@@ -17,6 +17,7 @@ from build123d import (
     BasePartObject,
     BuildPart,
     Color,
+    Joint,
     Location,
     LocationList,
     Mode,
@@ -25,11 +26,9 @@ from build123d import (
     RevoluteJoint,
     RigidJoint,
     Rotation,
+    RotationLike,
     Vector,
 )
-
-if TYPE_CHECKING:
-    from build123d import Joint, RotationLike
 
 __all__ = [
     "FixedJoint",

@@ -15,8 +15,8 @@ from typing import Final, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from .barrel import BarrelSpec, barrel_spec
-from .clearance import Clearance
+from .barrel import BarrelSpec, barrel_spec, check_gap
+from .clearance import Clearance, millimetres
 from .exceptions import HingeError
 from .fit import at_least
 from .knuckles import KnuckleLayout, groove, lay_out_knuckles
@@ -89,7 +89,7 @@ class DoubleSpec(BarrelSpec):
     bracket: Bracket
 
     @classmethod
-    def read(cls, size: float, **keywords: Unpack[DoubleHingeKeywords]) -> DoubleSpec:
+    def read(cls, size: float | str, **keywords: Unpack[DoubleHingeKeywords]) -> DoubleSpec:
         """Fill in the defaults.
 
         Parameters
@@ -110,6 +110,7 @@ class DoubleSpec(BarrelSpec):
             If the clearance cannot be read or the form of the bores is unknown.
         """
         options = DoubleHingeOptions(**keywords)
+        size = millimetres(size, "size")
         knuckles, plate = options.knuckles, options.plate
         if knuckles is None:
             knuckles = 5 if options.first == options.second else 3
@@ -412,6 +413,7 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
         If a parameter makes no sense.
     """
     _read_checked(spec)
+    check_gap(spec)
     room = (spec.knuckles, spec.radius, spec.clearance, spec.margin)
     if spec.same_edge:
         layouts: tuple[KnuckleLayout, ...] = (
@@ -474,6 +476,8 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
         ),
     )
     loose = tuple(
-        placed(rows, shape) for rows, layout, _ in in_link for shape in spec.pin.hardware(layout)
+        placed(rows, shape)
+        for rows, layout, _ in in_link
+        for shape in spec.pin.hardware(layout, spec.bore_form)
     )
     return DoublePlan(spec, layouts, bodies[0], link, bodies[1], loose)

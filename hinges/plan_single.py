@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Unpack
 
-from .barrel import BarrelSpec, barrel_spec
+from .barrel import BarrelSpec, barrel_spec, check_gap
+from .clearance import millimetres
 from .exceptions import FitError, HingeError
 from .fit import at_least, at_most
 from .knuckles import KnuckleLayout, groove, lay_out_knuckles
@@ -49,7 +50,7 @@ class SingleSpec(BarrelSpec):
     detents: Detents | None
 
     @classmethod
-    def read(cls, length: float, **keywords: Unpack[SingleHingeKeywords]) -> SingleSpec:
+    def read(cls, length: float | str, **keywords: Unpack[SingleHingeKeywords]) -> SingleSpec:
         """Fill in the defaults.
 
         Parameters
@@ -70,6 +71,7 @@ class SingleSpec(BarrelSpec):
             If the clearance cannot be read or the form of the bores is unknown.
         """
         options = SingleHingeOptions(**keywords)
+        length = millimetres(length, "length")
         sizes = dict(vars(barrel_spec(options, length, options.knuckles, (0.0, options.angle))))
         if options.margin is None and isinstance(options.leaf, Leaf):
             sizes["margin"] = 0.0
@@ -160,6 +162,7 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
     layout = lay_out_knuckles(spec.length, spec.knuckles, spec.radius, spec.clearance, spec.margin)
     if not 0.0 < spec.gap <= 2.0 * spec.radius:
         raise HingeError(f"gap {spec.gap:g} mm must be above 0 and at most the barrel's thickness")
+    check_gap(spec)
     spec.pin.check(layout, spec.wall, spec.bore_form)
     spec.leaf.check(layout, spec.gap, spec.wall)
     _check_turn(spec, layout)
@@ -209,4 +212,6 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
                 ),
             )
         )
-    return SinglePlan(spec, layout, core, halves[0], halves[1], spec.pin.hardware(layout))
+    return SinglePlan(
+        spec, layout, core, halves[0], halves[1], spec.pin.hardware(layout, spec.bore_form)
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, radians, sin, tan
+from typing import ClassVar
 
 from .clearance import Clearance
 from .exceptions import HingeError
@@ -34,6 +35,8 @@ class ConePin(Pin):
     tip : float
         Radius of the blunt tip in mm.
     """
+
+    printed: ClassVar[bool] = True
 
     radius: float
     angle: float = 45.0
@@ -208,6 +211,8 @@ class StraightPin(Pin):
     radius : float
         Radius of the pin in mm.
     """
+
+    printed: ClassVar[bool] = True
 
     radius: float
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from build123d import (
     Align,
@@ -13,14 +13,16 @@ from build123d import (
     Part,
     Plane,
     Rotation,
+    RotationLike,
     Solid,
+    VectorLike,
 )
 
 from .clearance import Clearance
 from .exact_solids import build_all, build_half, build_shape, one_part, solids_of
 from .exceptions import HingeError
 from .leaf import Bracket, Leaf
-from .options import BoreStyle
+from .options import BoreStyle, SingleHingeKeywords, SingleHingeOptions, call_of
 from .pins import Pin
 from .placement import (
     FixedJoint,
@@ -33,9 +35,6 @@ from .placement import (
 )
 from .plan_single import SinglePlan, SingleSpec, plan_single
 from .stops import Detents, Stops
-
-if TYPE_CHECKING:
-    from build123d import RotationLike, VectorLike
 
 __all__ = ["HingeCarve", "HingeHalf", "SingleHinge", "hinge_location"]
 
@@ -109,8 +108,8 @@ class SingleHinge(PlacedPart):
 
     Parameters
     ----------
-    length : float
-        Length in mm of the edge that the hinge is for.
+    length : float or str
+        Length of the edge that the hinge is for: in mm, or with a unit such as "2 in".
     knuckles : int
         Number of knuckles, 2 or more. With an odd count the parent has one more than the child.
     radius : float, optional
@@ -179,7 +178,7 @@ class SingleHinge(PlacedPart):
 
     def __init__(
         self,
-        length: float,
+        length: float | str,
         *,
         knuckles: int = 3,
         radius: float | None = None,
@@ -200,24 +199,25 @@ class SingleHinge(PlacedPart):
         align: Align | tuple[Align, Align, Align] | None = None,
         mode: Mode = Mode.ADD,
     ) -> None:
-        self.spec = SingleSpec.read(
-            length,
-            knuckles=knuckles,
-            radius=radius,
-            pin=pin,
-            clearance=clearance,
-            leaf=leaf,
-            gap=gap,
-            angle=angle,
-            angular_range=angular_range,
-            stops=stops,
-            detents=detents,
-            chamfer=chamfer,
-            margin=margin,
-            wall=wall,
-            bore=bore,
-            up=up,
-        )
+        asked: SingleHingeKeywords = {
+            "knuckles": knuckles,
+            "radius": radius,
+            "pin": pin,
+            "clearance": clearance,
+            "leaf": leaf,
+            "gap": gap,
+            "angle": angle,
+            "angular_range": angular_range,
+            "stops": stops,
+            "detents": detents,
+            "chamfer": chamfer,
+            "margin": margin,
+            "wall": wall,
+            "bore": bore,
+            "up": up,
+        }
+        self.spec = SingleSpec.read(length, **asked)
+        self._asked = (length, asked)
         plan_single(self.spec)
         super().__init__(part=self._built(), rotation=rotation, align=align, mode=mode)
         self.label = "hinge"
@@ -233,6 +233,10 @@ class SingleHinge(PlacedPart):
                 *_posed(self.spec, "child", (_half(self.spec, "child"),)).solids(),
             ]
         )
+
+    def __repr__(self) -> str:
+        """The call that makes this hinge, without what is left at its default."""
+        return call_of("SingleHinge", *self._asked, SingleHingeOptions())
 
     @property
     def plan(self) -> SinglePlan:

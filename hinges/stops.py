@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import asin, cos, degrees, radians, sin, sqrt
 
+from .clearance import number
 from .exceptions import HingeError
 from .fit import at_least, at_most
 from .knuckles import KnuckleLayout
@@ -152,7 +153,10 @@ class Detents:
     _LEAN = 0.5  # radius gained per height: about 27° to the bump's own axis
 
     def __post_init__(self) -> None:
-        """Refuse what cannot click."""
+        """Refuse what cannot click; a single angle is one of several."""
+        angles = self.angles if isinstance(self.angles, (tuple, list)) else (self.angles,)
+        read = tuple(number(angle, "a detent's angle") for angle in angles)
+        object.__setattr__(self, "angles", read)
         if not self.angles or self.interference <= 0.0 or self.snug <= 0.0 or self.ridge <= 0.0:
             raise HingeError(
                 "detents need at least one angle and an interference, a snug room and a ridge "

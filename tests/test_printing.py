@@ -262,3 +262,14 @@ def test_overhang_of_a_table():
     assert "0 % with -z up" in check.note
     free = check_bodies(joinery, tree, motion, load_profile("sls-pa12"))
     assert "no support" in found(free, "overhang").note
+
+
+def test_hinges_and_profiles_have_one_default_a_process():
+    import hinges
+    from fabfold.version import __version__
+    from hinges.clearance import PROCESSES
+
+    assert hinges.__version__ == __version__
+    usual = ("fdm-pla-0.4", "mjf-pa12", "polyjet", "sla-tough", "sls-pa12")
+    profiles = {p.process.lower(): p.clearance_mm for p in map(load_profile, usual)}
+    assert profiles == {name: process.radial for name, process in PROCESSES.items()}
