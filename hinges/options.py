@@ -99,6 +99,7 @@ class SingleHingeKeywords(BarrelKeywords, total=False):
     angular_range: tuple[float, float]
     stops: Stops | bool | None
     detents: Detents | None
+    friction: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,6 +112,7 @@ class SingleHingeOptions(BarrelOptions):
     angular_range: tuple[float, float] = (0.0, 180.0)
     stops: Stops | bool | None = None
     detents: Detents | None = None
+    friction: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what is no angle, no range, no leaf, no stops and no detents."""
@@ -125,6 +127,10 @@ class SingleHingeOptions(BarrelOptions):
             )
         if self.detents is not None and not isinstance(self.detents, Detents):
             raise HingeError(f"detents is {self.detents!r}: give Detents((0, 90)) or the like")
+        if self.friction is not None and number(self.friction, "friction") <= 0.0:
+            raise HingeError(f"friction is {self.friction:g} mm: give an interference above 0")
+        if self.friction is not None and self.detents is not None:
+            raise HingeError("friction and detents share their bumps: give one of them")
         if self.leaf is not None and not isinstance(self.leaf, (Bracket, Leaf)):
             raise HingeError(f"leaf is {self.leaf!r}: give Bracket(...) or Leaf(...)")
 

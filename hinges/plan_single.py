@@ -82,9 +82,16 @@ class SingleSpec(BarrelSpec):
             angle=float(options.angle),
             angular_range=(float(low), float(high)),
             stops=Stops() if options.stops is True else options.stops or None,
-            detents=options.detents,
+            detents=_detents(options),
             **sizes,
         )
+
+
+def _detents(options: SingleHingeOptions) -> Detents | None:
+    """Detents as asked for; bumps that drag all the way but where it is drawn, for friction."""
+    if options.friction is None:
+        return options.detents
+    return Detents((options.angle,), interference=options.friction, ridge=360.0)
 
 
 @dataclass(frozen=True)
@@ -189,8 +196,7 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
     bumps: tuple[Shape, ...] = ()
     dimples: tuple[Shape, ...] = ()
     if spec.detents:
-        behind = min(far, bottom) - layout.groove_radius
-        spec.detents.check(layout, widest, spec.chamfer, behind, spec.angular_range)
+        spec.detents.check(layout, widest, spec.chamfer, spec.gap, spec.wall, spec.angular_range)
         bumps = spec.detents.bumps(layout, widest, spec.chamfer)
         dimples = spec.detents.dimple_cuts(
             layout, widest, spec.chamfer, spec.angle, spec.angular_range

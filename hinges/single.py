@@ -132,6 +132,9 @@ class SingleHinge(PlacedPart):
         Lugs at the ends of the range; True for one at the upper end.
     detents : Detents, optional
         Angles at which it clicks.
+    friction : float, optional
+        Interference in mm of bumps that drag over the whole turn, so that a lid stays where it is
+        let go: 0.05 to 0.1. It is free at the angle that is drawn and printed.
     chamfer : float
         Leg in mm of the 45° chamfer on the ends of barrels; 0 for none.
     margin : float, optional
@@ -190,6 +193,7 @@ class SingleHinge(PlacedPart):
         angular_range: tuple[float, float] = (0.0, 180.0),
         stops: Stops | bool | None = None,
         detents: Detents | None = None,
+        friction: float | None = None,
         chamfer: float = 0.0,
         margin: float | None = None,
         wall: float | None = None,
@@ -210,6 +214,7 @@ class SingleHinge(PlacedPart):
             "angular_range": angular_range,
             "stops": stops,
             "detents": detents,
+            "friction": friction,
             "chamfer": chamfer,
             "margin": margin,
             "wall": wall,

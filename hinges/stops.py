@@ -1,20 +1,23 @@
 """End stops and detents: where a hinge ends its turn, and where it clicks.
 
 A stop is a lug on the child whose flat face meets the parent's face in one plane at the stop's
-angle. A detent is a small cone on an end face of a parent's knuckle that drops into dimples of the
-child's knuckle; between two dimples it runs in a relieved track, and over the ridges beside each
-dimple it is pressed in by the interference.
+angle. A detent is a pair of small cones on the two end faces of the parent that look at one
+knuckle of the child. They drop into dimples of that knuckle; between two dimples they run in
+relieved tracks, and over the ridges beside each dimple they are pressed in by the interference.
+Since they stand at both ends, the child cannot slip aside by its axial play: what one gains the
+other loses.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import asin, cos, degrees, radians, sin, sqrt
+from typing import ClassVar
 
 from .clearance import number
-from .exceptions import HingeError
+from .exceptions import FitError, HingeError
 from .fit import at_least, at_most
-from .knuckles import KnuckleLayout
+from .knuckles import Knuckle, KnuckleLayout
 from .shapes import Moved, Point, Prism, Shape, Turned
 
 __all__ = ["Detents", "Stops"]
@@ -128,48 +131,60 @@ class Detents:
 
     Parameters
     ----------
-    angles : tuple of float
+    angles : float or tuple of float
         Where it clicks, in degrees.
     interference : float
-        How deep the bump is pressed into the ridges, in mm.
+        How deep the bump at each end is pressed in over the ridges, in mm.
     snug : float
-        Room of the bump in a dimple in mm; at the angle that is drawn (and printed) the dimple
-        has the hinge's clearance instead.
+        Room of a bump in a dimple in mm; at the angle that is drawn (and printed) the dimple has
+        the hinge's clearance instead.
     ridge : float
         Width of the ridge on either side of a dimple in degrees; the rest of the track is
-        relieved.
+        relieved. 360 leaves no track: the hinge then drags all the way.
     strain : float
         Strain, as a share of 1, that the material bears again and again; 0.02 suits PETG, PP and
         nylon, 0.008 PLA.
+    width : float
+        Width of a bump halfway up, in mm: two widths of the nozzle at least.
     """
 
     angles: tuple[float, ...]
-    interference: float = 0.1
+    interference: float = 0.07
     snug: float = 0.05
     ridge: float = 12.0
     strain: float = 0.02
+    width: float = 0.8
 
-    _TIP = 0.15
-    _LEAN = 0.5  # radius gained per height: about 27° to the bump's own axis
+    _LEAN: ClassVar[float] = 0.5  # radius gained per height: about 27° to the bump's own axis
+    #: Where bumps stand on the parent: outwards, far from its body, where a knuckle gives most.
+    _PLACE: ClassVar[float] = 45.0
+    #: Of plastics; of a rectangular section.
+    _POISSON: ClassVar[float] = 0.35
+    _SHEAR: ClassVar[float] = 1.2
 
     def __post_init__(self) -> None:
         """Refuse what cannot click; a single angle is one of several."""
         angles = self.angles if isinstance(self.angles, (tuple, list)) else (self.angles,)
         read = tuple(number(angle, "a detent's angle") for angle in angles)
         object.__setattr__(self, "angles", read)
-        if not self.angles or self.interference <= 0.0 or self.snug <= 0.0 or self.ridge <= 0.0:
+        sizes = (self.interference, self.snug, self.ridge, self.strain, self.width)
+        if not read or min(number(size, "a detent's size") for size in sizes) <= 0.0:
             raise HingeError(
-                "detents need at least one angle and an interference, a snug room and a ridge "
-                "width above 0"
+                "detents need at least one angle, and an interference, a snug room, a ridge width, "
+                "a strain and a bump's width above 0"
             )
 
     def _height(self, layout: KnuckleLayout) -> float:
-        """How far the bump stands out of its face, in mm."""
+        """How far a bump stands out of its face, in mm."""
         return layout.clearance.axial + self.interference
 
+    def _tip(self, layout: KnuckleLayout) -> float:
+        """Radius of a bump at its tip in mm."""
+        return 0.5 * self.width - 0.5 * self._LEAN * self._height(layout)
+
     def _foot(self, layout: KnuckleLayout) -> float:
-        """Radius of the bump at its foot in mm."""
-        return self._TIP + self._LEAN * self._height(layout)
+        """Radius of a bump at its foot in mm."""
+        return 0.5 * self.width + 0.5 * self._LEAN * self._height(layout)
 
     def _room(self, normal: float) -> float:
         """Widen a flank by `normal` mm, measured in its radius."""
@@ -180,7 +195,7 @@ class Detents:
         height, axial = self._height(layout), layout.clearance.axial
         wide = self._room(room)
         mouth = self._foot(layout) - self._LEAN * axial + wide
-        end = self._TIP + wide
+        end = self._tip(layout) + wide
         deep = height + room
         return (
             (0.0, axial - 0.05),
@@ -194,16 +209,26 @@ class Detents:
         """Radius of the circle on which bumps and dimples stand, in mm."""
         return 0.5 * (core + layout.radius - chamfer)
 
+    @staticmethod
+    def _held(layout: KnuckleLayout) -> tuple[Knuckle, Knuckle, Knuckle] | None:
+        """The first knuckle of the child between two of the parent's, and those."""
+        rows = zip(layout.knuckles, layout.knuckles[1:], layout.knuckles[2:], strict=False)
+        for before, held, after in rows:
+            if held.owner != layout.pin_owner == before.owner == after.owner:
+                return before, held, after
+        return None
+
     def _faces(self, layout: KnuckleLayout) -> tuple[tuple[float, float], ...]:
-        """Where bumps stand: plane z and direction along z, for the pin owner's first end."""
-        return tuple(
-            (knuckle.end, 1.0)
-            for knuckle, after in zip(layout.knuckles, layout.knuckles[1:], strict=False)
-            if knuckle.owner == layout.pin_owner and after.owner != layout.pin_owner
-        )[:1]
+        """Where bumps stand: plane z and direction along z, at both ends of one knuckle."""
+        row = self._held(layout)
+        return () if row is None else ((row[0].end, 1.0), (row[2].start, -1.0))
+
+    def _moved(self, shape: Shape, circle: float, turn: float, face: tuple[float, float]) -> Moved:
+        place, (z, direction) = radians(turn), face
+        return Moved(shape, (circle * cos(place), circle * sin(place), z), (0.0, 0.0, direction))
 
     def bumps(self, layout: KnuckleLayout, core: float, chamfer: float) -> tuple[Shape, ...]:
-        """Draw the bumps on the parent, in its own direction 225°.
+        """Draw the bumps on the parent.
 
         Parameters
         ----------
@@ -224,17 +249,11 @@ class Detents:
             (0.0, -0.2),
             (self._foot(layout), -0.2),
             (self._foot(layout), 0.0),
-            (self._TIP, height),
+            (self._tip(layout), height),
             (0.0, height),
         )
-        place = radians(225.0)
         return tuple(
-            Moved(
-                Turned(outline),
-                (circle * cos(place), circle * sin(place), z),
-                (0.0, 0.0, direction),
-            )
-            for z, direction in self._faces(layout)
+            self._moved(Turned(outline), circle, self._PLACE, face) for face in self._faces(layout)
         )
 
     def dimple_cuts(
@@ -267,19 +286,13 @@ class Detents:
         """
         circle = self._pitch_radius(layout, core, chamfer)
         made: list[Shape] = []
-        for z, direction in self._faces(layout):
+        for face in self._faces(layout):
             for angle in sorted(self.angles):
                 room = layout.clearance.radial if abs(angle - drawn) < 1e-6 else self.snug
-                place = radians(225.0 - angle)
-                made.append(
-                    Moved(
-                        Turned(self._dimple(layout, room)),
-                        (circle * cos(place), circle * sin(place), z),
-                        (0.0, 0.0, direction),
-                    )
-                )
+                dimple = Turned(self._dimple(layout, room))
+                made.append(self._moved(dimple, circle, self._PLACE - angle, face))
             for first, last in self._tracks(layout, circle, limits, drawn):
-                made.append(self._track(layout, circle, z, direction, first, last))
+                made.append(self._track(layout, circle, face, first, last))
         return tuple(made)
 
     def _half_width(
@@ -292,7 +305,7 @@ class Detents:
     def _tracks(
         self, layout: KnuckleLayout, circle: float, limits: tuple[float, float], drawn: float
     ) -> list[tuple[float, float]]:
-        """Ranges of hinge angle in which the bump runs free."""
+        """Ranges of hinge angle in which the bumps run free."""
         own = degrees(self._foot(layout) / circle)
         blocks = sorted(
             (angle - side, angle + side)
@@ -311,24 +324,58 @@ class Detents:
         self,
         layout: KnuckleLayout,
         circle: float,
-        z: float,
-        direction: float,
+        face: tuple[float, float],
         first: float,
         last: float,
     ) -> Shape:
-        room = layout.clearance.axial
+        room, (z, direction) = layout.clearance.axial, face
         deep = self._height(layout) + room
         half = self._foot(layout) + self._room(room)
-        outline = [(circle - half, z), (circle + half, z)]
-        outline += [(circle + half, z + direction * deep), (circle - half, z + direction * deep)]
-        return Turned(tuple(outline), 225.0 - last, last - first)
+        low, high = sorted((z, z + direction * deep))
+        inner, outer = circle - half, circle + half
+        outline = ((inner, low), (outer, low), (outer, high), (inner, high))
+        return Turned(outline, self._PLACE - last, last - first)
+
+    def strain_at(self, layout: KnuckleLayout, core: float, chamfer: float, gap: float) -> float:
+        """Strain where a knuckle stands on its body, as its bump is pressed over a ridge.
+
+        Both neighbours of the child's knuckle give way by the interference. Each is a short beam on
+        its body, as high as its bump is above it and as deep as it is long, bent along the axis:
+        a part of the way is bending and the rest is shear (Timoshenko).
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        core, chamfer : float
+            As for :meth:`bumps`.
+        gap : float
+            Distance between the two bodies in mm.
+
+        Returns
+        -------
+        float
+            Equivalent strain (von Mises) as a share of 1.
+        """
+        row = self._held(layout)
+        if row is None:
+            return 0.0
+        high = self._pitch_radius(layout, core, chamfer) + gap * sqrt(0.5)
+        deep = min(row[0].length, row[2].length)
+        bent = 4.0 * (high / deep) ** 3
+        sheared = self._SHEAR * 2.0 * (1.0 + self._POISSON) * high / deep
+        share = bent / (bent + sheared)
+        stretch = 1.5 * share * self.interference * deep / high**2
+        shear = (1.0 - share) * self.interference / high
+        return sqrt(stretch**2 + shear**2 / 3.0)
 
     def check(
         self,
         layout: KnuckleLayout,
         core: float,
         chamfer: float,
-        web: float,
+        gap: float,
+        wall: float,
         limits: tuple[float, float],
     ) -> None:
         """Refuse detents that do not fit or that break the hinge.
@@ -341,17 +388,37 @@ class Detents:
             Largest radius that the pin takes, in mm.
         chamfer : float
             Leg of the chamfer on the ends of barrels in mm.
-        web : float
-            Thickness in mm of the bracket behind the groove.
+        gap : float
+            Distance between the two bodies in mm.
+        wall : float
+            Thinnest wall in mm.
         limits : (float, float)
             Lowest and highest angle of the hinge in degrees.
 
         Raises
         ------
         FitError
-            If a bump is too wide for its barrel, an angle lies outside the range, or the bracket is
-            bent too far.
+            If no knuckle of the child stands between two of the parent's, a bump is too wide for
+            its barrel or has no tip, an angle lies outside the range, or a knuckle is bent too far.
         """
+        row = self._held(layout)
+        if row is None:
+            raise FitError(
+                "detent",
+                "the number of knuckles of a hinge that clicks",
+                len(layout.knuckles),
+                3,
+                "use 3 knuckles or more: one of the child's has to stand between two of the "
+                "parent's, or it slips aside by its play",
+                "",
+            )
+        at_least(
+            "detent",
+            "the radius of a bump's tip",
+            self._tip(layout),
+            0.1,
+            "use a wider bump, less interference or a smaller clearance",
+        )
         at_least(
             "detent",
             "the free ring on the end face of a barrel",
@@ -359,19 +426,22 @@ class Detents:
             2.0 * self._foot(layout),
             "use a wider barrel, a thinner pin, less interference or a smaller clearance",
         )
+        deep = self.interference + max(layout.clearance.radial, layout.clearance.axial)
+        at_least(
+            "web",
+            "the material between the dimples of a knuckle",
+            row[1].length - 2.0 * deep,
+            wall,
+            "use fewer knuckles or a longer edge",
+        )
         for angle in self.angles:
             at_least("detent", "a detent's angle", angle, limits[0], "move it into the range", "°")
             at_most("detent", "a detent's angle", angle, limits[1], "move it into the range", "°")
-        bridge = min(
-            knuckle.length for knuckle in layout.knuckles if knuckle.owner != layout.pin_owner
-        )
-        bridge += 2.0 * layout.clearance.axial
-        lever = layout.radius
         at_most(
             "strain",
-            "the strain of the bracket as the bump is pressed over its ridge",
-            100.0 * web * 0.5 * self.interference / (lever * bridge),
+            "the strain of the knuckles as a bump is pressed over its ridge",
+            100.0 * self.strain_at(layout, core, chamfer, gap),
             100.0 * self.strain,
-            "use less interference, longer knuckles or a tougher material",
+            "use less interference, a wider barrel or a tougher material",
             "%",
         )

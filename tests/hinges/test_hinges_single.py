@@ -8,6 +8,8 @@ from dataclasses import fields
 from math import pi
 from pathlib import Path
 
+import manifold3d as m3
+import numpy as np
 import pytest
 from build123d import (
     Axis,
@@ -35,6 +37,7 @@ from hinges import (
     ScrewPin,
     SingleHinge,
     Stops,
+    StraightPin,
     hinge_location,
 )
 from hinges.options import (
@@ -272,10 +275,55 @@ def test_detents_press_by_their_interference_and_let_go_between():
     assert gap(parent, turned(child, 90.0), 0.5) == pytest.approx(detents.snug, abs=0.005)
     assert overlap(parent, turned(child, 50.0)) == pytest.approx(0.0, abs=1e-9)
     pressed = max(overlap(parent, turned(child, 90.0 + step)) for step in range(5, 30))
-    # what is pressed in is the blunt tip of the bump: a frustum as high as the interference
-    tip, foot = 0.15, 0.15 + 0.5 * detents.interference
+    # what is pressed in is the blunt tip of each bump: a frustum as high as the interference
+    tip = 0.4 - 0.25 * (0.3 + detents.interference)
+    foot = tip + 0.5 * detents.interference
     frustum = pi * detents.interference / 3.0 * (foot**2 + foot * tip + tip**2)
-    assert pressed == pytest.approx(frustum, rel=0.1)
+    assert pressed == pytest.approx(2 * frustum, rel=0.1)
+
+
+@pytest.mark.parametrize("shift", [-0.3, -0.15, 0.0, 0.1, 0.25])
+def test_a_detent_cannot_be_escaped_by_the_axial_play(shift):
+    """Wherever the child stands in its axial play, both bumps together press as deep."""
+    detents = Detents((0.0, 90.0), interference=0.07)
+    spec = SingleSpec.read(30, clearance=0.3, radius=3.4, pin=ConePin(1.5), detents=detents)
+    plan = plan_single(spec)
+    child = turned(mesh_of(plan.child), 90.0 + 20.0).translate((0.0, 0.0, shift))
+    bumps = mesh_of(plan.parent) ^ m3.Manifold.cylinder(30, 3.3, center=True)
+    pressed = [part.bounding_box() for part in (bumps ^ child).decompose()]
+    ridges = [box[5] - box[2] for box in pressed if abs(box[2]) < 14 and box[5] - box[2] < 0.5]
+    # the two pressed depths sum up to twice the interference, unless one is out of touch
+    assert sum(ridges) >= 2 * detents.interference - 1e-3
+    assert sum(ridges) == pytest.approx(max(2 * 0.07, 0.07 + abs(shift)), abs=5e-3)
+
+
+def test_a_bump_is_two_nozzles_wide_and_stands_at_both_ends():
+    wide = {}
+    for detents in (None, Detents((0.0,))):
+        spec = SingleSpec.read(30, clearance=0.3, radius=3.4, pin=ConePin(1.5), detents=detents)
+        wide[detents is None] = mesh_of(plan_single(spec).parent)
+    bumps = (wide[False] - wide[True]).decompose()
+    assert len(bumps) == 2
+    for bump in bumps:
+        low, high = np.array(bump.bounding_box()).reshape(2, 3)
+        assert high[2] - low[2] == pytest.approx(0.37, abs=1e-3)
+        middle = bump.slice(0.5 * (low[2] + high[2])).bounds()
+        assert middle[2] - middle[0] == pytest.approx(0.8, abs=0.02)
+
+
+def test_detents_need_a_knuckle_between_two():
+    with pytest.raises(HingeError, match="between two of the parent's"):
+        SingleHinge(30, knuckles=2, pin=StraightPin(1.5), radius=4, detents=Detents((0.0,)))
+
+
+def test_friction_drags_all_the_way_but_where_it_is_drawn():
+    hinge = SingleHinge(30, clearance=0.3, radius=3.4, pin=ConePin(1.5), friction=0.06)
+    parent, child = mesh_of(hinge.plan.parent), mesh_of(hinge.plan.child)
+    assert gap(parent, child, 0.5) == pytest.approx(0.3, abs=0.005)
+    pressed = [overlap(parent, turned(child, angle)) for angle in range(25, 181, 15)]
+    assert min(pressed) > 0.9 * max(pressed) > 0.0
+    with pytest.raises(HingeError, match="share their bumps"):
+        SingleHinge(30, friction=0.06, detents=Detents((0.0,)))
 
 
 def test_detents_only_in_a_pose_that_prints():
