@@ -7,6 +7,7 @@ from typing import Literal
 
 from build123d import (
     Align,
+    BuildPart,
     Color,
     Location,
     Mode,
@@ -18,16 +19,16 @@ from build123d import (
 )
 
 from .clearance import Clearance
-from .exact_solids import build_all, build_half, build_shape, one_part, solids_of
+from .exact_solids import build_all, build_half, build_shape, one_part
 from .exceptions import HingeError
 from .leaf import Bracket
+from .let_in import frame_at, let_in, one_body, require_edge
 from .options import BoreStyle, DoubleHingeKeywords, DoubleHingeOptions, call_of
 from .pins import Pin
 from .placement import (
     HingedPart,
     PlacedPart,
     add_joint,
-    keep_joints,
     outside_builders,
     require_free_joint,
 )
@@ -257,8 +258,8 @@ class DoubleHinge(PlacedPart):
 
     def fit(
         self,
-        parent: Part | Solid,
-        child: Part | Solid,
+        parent: Part | Solid | BuildPart,
+        child: Part | Solid | BuildPart,
         at: Location | Plane | None = None,
         joint: str = "link",
     ) -> tuple[Part, Part, Part]:
@@ -266,7 +267,7 @@ class DoubleHinge(PlacedPart):
 
         Parameters
         ----------
-        parent, child : Part or Solid
+        parent, child : Part, Solid or BuildPart
             The bodies in the drawn pose. Each keeps at least half the gap inside its box: away
             from the face that they share, and from the faces that they fold together on.
         at : Location or Plane, optional
@@ -285,30 +286,32 @@ class DoubleHinge(PlacedPart):
         HingeError
             If a body does not come out in one piece, or has a joint of that name.
         """
-        place = at.location if isinstance(at, Plane) else (at or Location())
-        require_free_joint((("parent", parent), ("child", child)), joint)
+        place = frame_at(at)
+        frame = place * self.place
+        bodies = {"parent": one_body(parent, "parent"), "child": one_body(child, "child")}
+        require_free_joint(tuple(bodies.items()), joint)
+        spec = self.spec
+        axes = self._axes()
         made = []
-        for name, body in (("parent", parent), ("child", child)):
+        for index, (name, body) in enumerate(bodies.items()):
+            axis = frame * axes[index]
+            layout = self.plan.layouts[min(index, len(self.plan.layouts) - 1)]
+            require_edge(body, name, axis, (layout.start, layout.end), spec.bracket)
             half = self._body(_body(name)).moved(place)
             carve = self._carved(_body(name)).moved(place)
-            solids = solids_of(solids_of(body)[0].cut(*carve.solids()))
-            fitted = HingedPart(solids_of(solids[0].fuse(*solids[1:], *half.solids())))
-            if len(fitted.solids()) != 1:
-                raise HingeError(
-                    f"the {name} body came out in {len(fitted.solids())} pieces: it must reach the "
-                    "bracket of its half, and the carve must not cut it in two"
-                )
-            fitted.label = body.label or name
-            fitted.color = body.color
-            keep_joints(body, fitted)
-            made.append(fitted)
+            reach = spec.radius + 0.01
+            made.append(let_in(body, name, half, carve, axis, reach, spec.bracket))
         link = HingedPart([self.link.moved(place).solid()])
         link.label, link.color = "link", Color(*COLORS["link"])
-        frame = place * self.place
         for part, name in ((made[0], "parent"), (link, "link"), (made[1], "child")):
             for label, at_joint, turns in _joints(self.spec, _body(name), joint):
                 add_joint(label, part, frame * at_joint, turns)
         return made[0], link, made[1]
+
+    def _axes(self) -> tuple[Location, Location]:
+        """Both axes in the drawn pose, seen from the hinge's frame."""
+        first, second = _joints(self.spec, "parent")[0][1], _joints(self.spec, "link")[1][1]
+        return first, second
 
 
 def _joints(

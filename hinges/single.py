@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import Literal
 
 from build123d import (
     Align,
+    BuildPart,
     Color,
     Location,
     Mode,
@@ -19,26 +21,28 @@ from build123d import (
 )
 
 from .clearance import Clearance
-from .exact_solids import build_all, build_half, build_shape, one_part, solids_of
+from .exact_solids import build_all, build_half, build_shape, one_part
 from .exceptions import HingeError
 from .leaf import Bracket, Leaf
+from .let_in import frame_at, let_in, one_body, require_edge
 from .options import BoreStyle, SingleHingeKeywords, SingleHingeOptions, call_of
 from .pins import Pin
 from .placement import (
     FixedJoint,
-    HingedPart,
     HingeJoint,
     PlacedPart,
-    keep_joints,
     outside_builders,
     require_free_joint,
 )
 from .plan_single import SinglePlan, SingleSpec, plan_single
 from .stops import Detents, Stops
+from .turn_sweep import TurnSweep, single_sweep, spread
 
 __all__ = ["HingeCarve", "HingeHalf", "SingleHinge", "hinge_location"]
 
 Side = Literal["parent", "child"]
+#: What bumps of detents and faces of stops may share with their partner, in mm³.
+_PRESSED = 0.5
 PARENT_COLOR = (0.20, 0.45, 0.70)
 CHILD_COLOR = (0.90, 0.55, 0.15)
 
@@ -286,22 +290,26 @@ class SingleHinge(PlacedPart):
 
     def fit(
         self,
-        parent: Part | Solid,
-        child: Part | Solid,
+        parent: Part | Solid | BuildPart,
+        child: Part | Solid | BuildPart,
         at: Location | Plane | None = None,
         joint: str = "hinge",
+        *,
+        check: bool = True,
     ) -> tuple[Part, Part]:
         """Let the hinge into two bodies.
 
         Parameters
         ----------
-        parent, child : Part or Solid
+        parent, child : Part, Solid or BuildPart
             The bodies in the drawn pose. Each keeps at least half the gap inside its quadrant:
             away from the face that they share, and from the one that they fold together on.
         at : Location or Plane, optional
             Where the hinge lies, see :func:`hinge_location`; where it is when left out.
         joint : str
             Name of the joints on both bodies; for a body with several hinges.
+        check : bool
+            Whether the bodies are turned through the range and measured.
 
         Returns
         -------
@@ -312,30 +320,106 @@ class SingleHinge(PlacedPart):
         Raises
         ------
         HingeError
-            If a body does not come out in one piece, because it does not meet its half; or has a
-            joint of that name.
+            If a body is not one solid, is shorter than the row of knuckles, does not come out in
+            one piece because it does not meet its half, or has a joint of that name; or if the two
+            meet as they turn, or touch as they are drawn.
+
+        Notes
+        -----
+        What would stand out of a body of its bracket is trimmed.
         """
-        place = at.location if isinstance(at, Plane) else (at or Location())
-        require_free_joint((("parent", parent), ("child", child)), joint)
-        made = []
-        for side, body in (("parent", parent), ("child", child)):
-            half = self._half(_side(side)).moved(place)
-            carve = self._carved(_side(side)).moved(place)
-            solids = solids_of(solids_of(body)[0].cut(*carve.solids()))
-            fitted = HingedPart(solids_of(solids[0].fuse(*solids[1:], *half.solids())))
-            if len(fitted.solids()) != len(solids_of(body)):
-                raise HingeError(
-                    f"the {side} body came out in {len(fitted.solids())} pieces: it must reach the "
-                    "bracket of its half, and the carve must not cut it in two"
-                )
-            fitted.label = body.label or side
-            fitted.color = body.color
-            keep_joints(body, fitted)
-            made.append(fitted)
+        place = frame_at(at)
         frame = place * self.place
-        HingeJoint(joint, made[0], frame, self.spec.angular_range)
-        FixedJoint(joint, made[1], frame * Rotation(0, 0, self.spec.angle))
+        bodies = {"parent": one_body(parent, "parent"), "child": one_body(child, "child")}
+        require_free_joint(tuple(bodies.items()), joint)
+        spec, layout = self.spec, self.plan.layout
+        reach = max(spec.radius, spec.stops.radius(layout) if spec.stops else 0.0) + 0.01
+        made = []
+        for name, body in bodies.items():
+            side = _side(name)
+            require_edge(body, name, frame, (layout.start, layout.end), spec.leaf)
+            half, carve = self._half(side).moved(place), self._carved(side).moved(place)
+            on_body = frame * Rotation(0, 0, spec.angle) if side == "child" else frame
+            made.append(let_in(body, name, half, carve, on_body, reach, spec.leaf))
+        HingeJoint(joint, made[0], frame, spec.angular_range)
+        FixedJoint(joint, made[1], frame * Rotation(0, 0, spec.angle))
+        if check:
+            self._require_turn(made[0], made[1], joint)
         return made[0], made[1]
+
+    def sweep(
+        self,
+        parent: Part,
+        child: Part,
+        angles: Iterable[float] | None = None,
+        joint: str = "hinge",
+    ) -> TurnSweep:
+        """Measure the gap between two bodies as they turn.
+
+        Parameters
+        ----------
+        parent, child : Part
+            Bodies that :meth:`fit` returned, in any pose.
+        angles : iterable of float, optional
+            Angles in degrees; the whole range in steps of 5° when left out.
+        joint : str
+            Name of the joint.
+
+        Returns
+        -------
+        TurnSweep
+            Gap and overlap at each angle.
+
+        Raises
+        ------
+        HingeError
+            If the surface of a body does not close.
+        """
+        wanted = spread(*self.spec.angular_range, 5.0) if angles is None else angles
+        frames = parent.joints[joint].location, child.joints[joint].location
+        return single_sweep(parent, child, frames, wanted)
+
+    def _require_turn(self, parent: Part, child: Part, joint: str) -> None:
+        """Refuse bodies that meet as they turn, or that print in one piece."""
+        spec = self.spec
+        least = 0.5 * min(spec.gap, spec.clearance.least)
+        frames = parent.joints[joint].location, child.joints[joint].location
+        angles = (spec.angle, *spread(*spec.angular_range, 15.0))
+        swept = single_sweep(parent, child, frames, angles, least)
+        worst, drawn = swept.worst, swept.poses[0]
+        if worst.overlap <= _PRESSED:
+            if spec.pin.printed and drawn.gap < least:
+                raise HingeError(
+                    f"at the drawn angle the bodies are {drawn.gap:.3g} mm apart and print in one "
+                    f"piece: keep each half a gap ({0.5 * spec.gap:g} mm) inside its quadrant, "
+                    "away from the face that they share and from the outer one"
+                )
+            return
+        # Seen from the hinge's frame, the child as it lies at angle 0.
+        boxes = [
+            body.moved(body.joints[joint].location.inverse()).bounding_box()
+            for body in (parent, child)
+        ]
+        tops = [box.max.Y - 0.5 * spec.gap for box in boxes]
+        high = max(range(2), key=lambda index: tops[index])
+        if boxes[0].center().X > 0.0 > boxes[1].center().X:
+            advice = (
+                "parent and child lie the wrong way round: swap them, or turn the direction along "
+                "the edge about"
+            )
+        elif tops[high] > spec.radius + 0.1:
+            advice = (
+                f"the {('parent', 'child')[high]} reaches {tops[high]:.3g} mm outwards beyond the "
+                "axis: put the axis on its outer edge, or give the angular_range that it can turn"
+            )
+        else:
+            advice = (
+                "keep both in their quadrants beside and below the axis, or give the "
+                "angular_range that they can turn"
+            )
+        raise HingeError(
+            f"at {worst.angle:.4g}° the bodies overlap by {worst.overlap:.4g} mm³: {advice}"
+        )
 
 
 class HingeHalf(PlacedPart):

@@ -39,8 +39,19 @@ class Stops:
     upper: bool = True
     reach: float | None = None
 
-    def _radius(self, layout: KnuckleLayout) -> float:
-        """Radius of the lug in mm."""
+    def radius(self, layout: KnuckleLayout) -> float:
+        """Find how far a lug reaches.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+
+        Returns
+        -------
+        float
+            Radius about the axis in mm.
+        """
         return layout.groove_radius + 2.0 if self.reach is None else self.reach
 
     def clear_angle(self, layout: KnuckleLayout, gap: float) -> float:
@@ -82,7 +93,7 @@ class Stops:
         tuple of Shape
             The lug, as long as the row of knuckles.
         """
-        far = self._radius(layout)
+        far = self.radius(layout)
         opening = radians(180.0 - angle) if upper else radians(angle)
         # In a frame where the child's own face is y = -top and the material lies at x > 0, y < 0,
         # the lug fills the wedge from that face up to the partner's face turned back.
@@ -119,7 +130,7 @@ class Stops:
                 at_least(
                     "stop",
                     f"the height of the face that the {name} stop leans on",
-                    min(far, self._radius(layout)) - layout.groove_radius,
+                    min(far, self.radius(layout)) - layout.groove_radius,
                     wall,
                     "use a wider bracket (deeper for the lower stop) or a larger stop reach",
                 )

@@ -205,9 +205,11 @@ def test_three_lines_let_it_into_two_bodies():
 
 def test_a_body_out_of_reach_is_refused():
     hinge = SingleHinge(20, clearance=0.3)
-    far = Pos(100, 0, 0) * Box(10, 10, 10)
+    near = Pos(10, -10, 0) * Box(19.7, 19.7, 19.7)
     with pytest.raises(HingeError, match="must reach the bracket"):
-        hinge.fit(far, Pos(10, -10, 0) * Box(19.7, 19.7, 19.7))
+        hinge.fit(Pos(-100, 0, 0) * Box(10, 10, 20), near)
+    with pytest.raises(HingeError, match=r"14\.4 mm long and reach 2\.2 mm beyond the parent body"):
+        hinge.fit(Pos(-100, 0, 0) * Box(10, 10, 10), near)
 
 
 def test_an_unknown_side_is_refused():
