@@ -8,7 +8,7 @@ in the same frame, in the closed pose.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, pi, radians, sin, tan
+from math import cos, hypot, pi, radians, sin, tan
 from typing import TYPE_CHECKING, Final, Literal
 
 from build123d import (
@@ -19,6 +19,7 @@ from build123d import (
     RigidJoint,
 )
 
+from .clearance import number
 from .exact_solids import build_shape, one_part, solids_of
 from .exceptions import HingeError
 from .fit import at_least, at_most
@@ -204,6 +205,11 @@ class SnapSpec:
         out.
     wall : float
         Thinnest tongue in mm.
+    arc : float, optional
+        Distance in mm from the tongue to the axis about which it closes, as on a lid with a hinge;
+        the tongue bends in the plane of that arc. It closes straight when left out.
+    inwards : bool
+        Whether the ridge looks towards that axis.
     """
 
     length: float = 8.0
@@ -215,16 +221,43 @@ class SnapSpec:
     material: str = "pla"
     lead: float = 45.0
     wall: float = 0.8
+    arc: float | None = None
+    inwards: bool = False
+
+    def shift(self, height: float) -> float:
+        """How far the tongue stands aside in the mouth of its mortise as it closes on an arc.
+
+        Parameters
+        ----------
+        height : float
+            Height above the face, in mm, of the point of the tongue that is in the mouth.
+
+        Returns
+        -------
+        float
+            Away from the axis of the arc, in mm; 0 where it closes straight.
+        """
+        # On its way through the plane of the mouth a point is as far from the axis as ever.
+        return 0.0 if self.arc is None else hypot(self.arc, height) - self.arc
 
     @property
     def deflection(self) -> float:
-        """How far the tongue bends when it goes in: ridge less clearance, in mm."""
-        return self.catch - self.clearance
+        """How far the tongue bends as its ridge goes in: ridge less clearance, in mm.
+
+        On an arc the tongue stands outwards by then: a ridge that looks outwards is pressed by that
+        much more, one that looks towards the axis by less.
+        """
+        aside = self.shift(self.ridge_at)
+        return max(0.0, self.catch - self.clearance + (-aside if self.inwards else aside))
 
     @property
     def strain(self) -> float:
-        """Largest strain while it goes in: a cantilever bent at its ridge, 1.5 t δ / l²."""
-        return 1.5 * self.thickness * self.deflection / self.ridge_at**2
+        """Largest strain while it goes in: a cantilever, 1.5 t δ / l².
+
+        It is bent at its ridge; and, on an arc, at its tip, which comes in aside of the mortise.
+        """
+        at_tip = max(0.0, self.shift(self.length) - self.clearance) / self.length**2
+        return 1.5 * self.thickness * max(self.deflection / self.ridge_at**2, at_tip)
 
     @property
     def ridge_at(self) -> float:
@@ -256,10 +289,15 @@ class SnapSpec:
             "wall", "the tongue's thickness", self.thickness, self.wall, "use a thicker tongue"
         )
         at_least("wall", "the tongue's width", self.width, 2.0 * self.wall, "use a wider tongue")
+        if self.arc is not None and number(self.arc, "arc") <= self.length:
+            raise HingeError(
+                f"snap tongue: arc {self.arc:g} mm must be above the tongue's length "
+                f"{self.length:g} mm"
+            )
         at_least(
             "retention",
             "what the ridge catches behind after its clearance",
-            self.deflection,
+            self.catch - self.clearance,
             0.1,
             "use a higher catch or a smaller clearance",
         )
@@ -275,7 +313,10 @@ class SnapSpec:
             f"the strain of the tongue in {self.material}",
             100.0 * self.strain,
             100.0 * STRAIN_LIMITS[self.material.lower()],
-            "use a longer or thinner tongue, a lower catch or a tougher material",
+            "use a longer or thinner tongue, a lower catch or a tougher material"
+            if self.arc is None
+            else "use a shorter or thinner tongue farther from the axis, more clearance or a "
+            "tougher material",
             "%",
         )
 

@@ -287,6 +287,7 @@ def write_coupon(
     wall_mm: float = 0.8,
     title: str = "Hinge coupon",
     guide: bool = True,
+    bed_mm: tuple[float, float] | None = None,
 ) -> list[Path]:
     """Write a coupon for the slicer or for CAD, and the page that tells how to read it.
 
@@ -305,6 +306,8 @@ def write_coupon(
     guide : bool
         Whether to write a one-page PDF too, ``<name>-guide.pdf`` beside the file, that tells how to
         read the coupon.
+    bed_mm : (float, float), optional
+        Size of the printer's bed in mm.
 
     Returns
     -------
@@ -314,7 +317,8 @@ def write_coupon(
     Raises
     ------
     HingeError
-        If the suffix is unknown or the clearances cannot be used.
+        If the suffix is unknown, the clearances cannot be used, or the coupon is larger than the
+        bed.
     """
     from .guide import write_guide
 
@@ -326,6 +330,8 @@ def write_coupon(
             f"coupon file {target.name!r}: use a name that ends in {', '.join(sorted(writers))}"
         )
     bodies = plan_coupon(clearances, length_mm, wall_mm)
+    if bed_mm is not None:
+        _require_bed(bodies, bed_mm)
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".part-{target.name}")
     written = [target]
@@ -345,6 +351,22 @@ def write_coupon(
             part.unlink(missing_ok=True)
         written.append(page)
     return written
+
+
+def _require_bed(bodies: Sequence[CouponBody], bed_mm: tuple[float, float]) -> None:
+    """Refuse a coupon whose frame is larger than the bed, also turned by a quarter."""
+    boxes = [
+        manifold_of(shape, 16, outside=False).bounding_box()
+        for body in bodies
+        for shape in body.shapes
+    ]
+    low, high = np.min(boxes, axis=0)[:2], np.max(boxes, axis=0)[3:5]
+    wide, deep = sorted(high - low)
+    if wide > min(bed_mm) or deep > max(bed_mm):
+        raise HingeError(
+            f"the coupon is {high[0] - low[0]:.0f} x {high[1] - low[1]:.0f} mm, and the bed "
+            f"{bed_mm[0]:g} x {bed_mm[1]:g} mm: give fewer clearances"
+        )
 
 
 def _joined(bodies: Sequence[CouponBody]) -> MeshPart:

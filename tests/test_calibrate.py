@@ -59,3 +59,38 @@ def test_a_profile_for_bodies_apart_comes_back_with_the_clearance_that_was_read(
     assert again == mine
     assert again.apart.clearance_mm == 0.25
     assert (again.apart.face_gap_mm, again.apart.grip_mm, again.apart.slip_mm) == (0.2, 0.1, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("turns", "more", "words"),
+    [
+        (0.9, {}, "this coupon has 0.15, 0.2"),
+        (0.3, {"fuses_mm": 0.12}, "--fuses 0.12"),
+        (0.3, {"clearances": "0.6,0.7"}, "this coupon has 0.6, 0.7"),
+        (0.3, {"name": "../mine"}, "no name for a profile"),
+    ],
+)
+def test_numbers_that_are_not_on_the_coupon_are_refused(turns, more, words):
+    with pytest.raises(RecipeError, match=words):
+        calibrate(load_profile("sls-pa12"), turns, **more)
+    mine = calibrate(load_profile("sls-pa12"), 0.7, fuses_mm=0.6, clearances="0.6,0.7")
+    assert mine.clearance_mm == 0.7
+
+
+def test_no_profile_is_overwritten(tmp_path):
+    mine = calibrate(load_profile("sls-pa12"), 0.3)
+    (tmp_path / "mine.toml").write_text("precious")
+    with pytest.raises(RecipeError, match="is there already"):
+        write_profile(tmp_path / "mine.toml", mine)
+    assert (tmp_path / "mine.toml").read_text() == "precious"
+    with pytest.raises(RecipeError, match="a profile.s file ends"):
+        write_profile(tmp_path / "mine.txt", mine)
+
+
+def test_a_coupon_larger_than_the_bed_is_refused(tmp_path):
+    from fabfold.printing.profile_coupon import make_coupon
+
+    many = ",".join(f"{0.2 + 0.01 * step:.2f}" for step in range(36))
+    with pytest.raises(RecipeError, match=r"the coupon is .* mm, and the bed 145 x 145 mm"):
+        make_coupon(tmp_path / "coupon.3mf", "sla-tough", many)
+    assert list(tmp_path.iterdir()) == []

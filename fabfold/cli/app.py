@@ -310,6 +310,10 @@ def calibrate(
         float | None,
         typer.Option("--fuses", help="Largest clearance on the coupon whose hinge is fused, mm."),
     ] = None,
+    clearances: Annotated[
+        str | None,
+        typer.Option("--clearances", help="What the coupon was made with, where not the default."),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="The new profile. Default: my-PROFILE.toml."),
@@ -321,9 +325,8 @@ def calibrate(
     from fabfold.printing.profiles import DEFAULT_PROFILE, load_profile
 
     name = "" if output is None else output.stem
-    mine = calibrated(
-        load_profile(profile or DEFAULT_PROFILE), turns_freely, fuses_mm=fuses, name=name
-    )
+    known = load_profile(profile or DEFAULT_PROFILE)
+    mine = calibrated(known, turns_freely, fuses_mm=fuses, name=name, clearances=clearances)
     path = output or Path(f"{mine.name}.toml")
     write_profile(path, mine)
     typer.echo(f"{path}: clearance {mine.clearance_mm:g} mm; use it with --profile {path}")

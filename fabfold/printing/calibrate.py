@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import tomlkit
 
 from fabfold.errors import RecipeError
 from fabfold.files import write_text
+from fabfold.printing.profile_coupon import coupon_clearances
 from fabfold.printing.profiles import Profile
 
 __all__ = ["calibrate", "write_profile"]
 
 
 def calibrate(
-    profile: Profile, turns_freely_mm: float, *, fuses_mm: float | None = None, name: str = ""
+    profile: Profile,
+    turns_freely_mm: float,
+    *,
+    fuses_mm: float | None = None,
+    name: str = "",
+    clearances: str | None = None,
 ) -> Profile:
     """Profile with the clearance that a coupon of this printer needs.
 
@@ -30,6 +37,8 @@ def calibrate(
         clearance is kept.
     name : str, optional
         Name of the new profile; ``my-`` and the name of the shipped one by default.
+    clearances : str, optional
+        What the coupon was made with, with commas between; the default coupon's if left out.
 
     Returns
     -------
@@ -39,12 +48,18 @@ def calibrate(
     Raises
     ------
     RecipeError
-        If the figures contradict each other.
+        If the figures contradict each other or are none of the coupon's, or the name is none.
     """
-    if not 0.0 < turns_freely_mm <= 5.0:
-        raise RecipeError(
-            f"--turns-freely {turns_freely_mm:g}: give the number beside the hinge, 0.01 to 5 mm"
-        )
+    values = coupon_clearances(clearances)
+    for option, figure in (("--turns-freely", turns_freely_mm), ("--fuses", fuses_mm)):
+        if figure is not None and not any(abs(figure - value) < 1e-6 for value in values):
+            listed = ", ".join(f"{value:g}" for value in values)
+            raise RecipeError(
+                f"{option} {figure:g}: give the number beside the hinge; this coupon has {listed} "
+                "(--clearances tells of another)"
+            )
+    if name and not re.fullmatch(r"[\w.-]+", name):
+        raise RecipeError(f"{name!r} is no name for a profile: use letters, digits, - and _")
     if fuses_mm is not None and not 0.0 <= fuses_mm < turns_freely_mm:
         raise RecipeError(
             f"--fuses {fuses_mm:g}: must be below --turns-freely {turns_freely_mm:g}, a hinge "
@@ -64,7 +79,7 @@ def calibrate(
         read += f", {fuses_mm:g} mm fuses"
     return profile.model_copy(
         update={
-            "name": name or f"my-{profile.name}",
+            "name": name or f"my-{Path(profile.name).name}",
             "description": f"{profile.description} (calibrated by a coupon)".strip(),
             "clearance_mm": round(turns_freely_mm, 4),
             "min_gap_mm": round(gap, 4),
@@ -83,7 +98,16 @@ def write_profile(path: Path, profile: Profile) -> None:
         File to write, ending in ``.toml``.
     profile : Profile
         The profile; fields that are None are left out.
+
+    Raises
+    ------
+    RecipeError
+        If there is a file of that name, or it does not end in ``.toml``.
     """
+    if path.suffix != ".toml":
+        raise RecipeError(f"{path}: a profile's file ends in .toml")
+    if path.exists():
+        raise RecipeError(f"{path} is there already: remove it, or give another with --output")
     document = tomlkit.document()
     for key, value in profile.model_dump(exclude_none=True).items():
         item = tomlkit.item(list(value) if isinstance(value, tuple) else value)

@@ -7,7 +7,7 @@ from pathlib import Path
 from fabfold.errors import RecipeError
 from fabfold.printing.profiles import DEFAULT_PROFILE, load_profile
 
-__all__ = ["make_coupon"]
+__all__ = ["coupon_clearances", "make_coupon"]
 
 
 def make_coupon(
@@ -35,19 +35,39 @@ def make_coupon(
         If a value is wrong, or the hinges cannot be made with it.
     """
     from hinges.exceptions import HingeError
-    from hinges.tolerance_coupon import DEFAULT_CLEARANCES, write_coupon
+    from hinges.tolerance_coupon import write_coupon
 
     known = load_profile(profile or DEFAULT_PROFILE)
-    values = DEFAULT_CLEARANCES
-    if clearances is not None:
-        try:
-            values = tuple(float(part) for part in clearances.split(","))
-        except ValueError:
-            raise RecipeError(
-                f"--clearances wants numbers such as 0.2,0.3,0.4, found {clearances!r}"
-            ) from None
+    values = coupon_clearances(clearances)
     title = f"Hinge coupon, {known.name}"
     try:
-        return write_coupon(path, values, wall_mm=max(0.8, known.min_wall_mm), title=title)
+        bed = None if known.bed_mm is None else known.bed_mm[:2]
+        wall = max(0.8, known.min_wall_mm)
+        return write_coupon(path, values, wall_mm=wall, title=title, bed_mm=bed)
     except HingeError as error:
         raise RecipeError(str(error)) from None
+
+
+def coupon_clearances(text: str | None) -> tuple[float, ...]:
+    """Clearances of a coupon in mm.
+
+    Parameters
+    ----------
+    text : str or None
+        As given with ``--clearances``; None for the default coupon.
+
+    Raises
+    ------
+    RecipeError
+        If these are no numbers.
+    """
+    from hinges.tolerance_coupon import DEFAULT_CLEARANCES
+
+    if text is None:
+        return DEFAULT_CLEARANCES
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise RecipeError(
+            f"--clearances wants numbers such as 0.2,0.3,0.4, found {text!r}"
+        ) from None

@@ -1,6 +1,6 @@
 """Magnet pockets and snap tongues."""
 
-from math import pi
+from math import atan2, cos, pi, sin
 
 import pytest
 from build123d import Box, BuildPart, Mode, Pos
@@ -106,3 +106,40 @@ def test_solids_are_valid():
         assert len(part.solids()) == 1
         assert part.solid().is_valid
         assert "snap" in part.joints
+
+
+def bent_on_its_arc(spec: SnapSpec) -> float:
+    """Strain of a tongue whose points are turned about the axis, step by step."""
+    worst = 0.0
+    side = -1.0 if spec.inwards else 1.0
+    for step in range(2001):
+        turn = atan2(spec.length, spec.arc) * step / 2000
+        for height in (spec.ridge_at, spec.length):
+            # The tongue hangs from the lid at (arc, 0); the mouth is the line z = 0.
+            x = spec.arc * cos(turn) + height * sin(turn) - spec.arc
+            z = spec.arc * sin(turn) - height * cos(turn)
+            if z > 1e-9:
+                continue  # still outside of the mortise
+            press = x - spec.clearance
+            if height == spec.ridge_at and abs(z) < 0.02:
+                press = side * x + spec.catch - spec.clearance
+            worst = max(worst, 1.5 * spec.thickness * press / height**2)
+    return worst
+
+
+@pytest.mark.parametrize("arc", [25.0, 40.0, 75.0, 200.0])
+@pytest.mark.parametrize("inwards", [False, True])
+def test_the_strain_of_a_tongue_on_a_lid_is_that_of_its_arc(arc, inwards):
+    spec = SnapSpec(length=8, arc=arc, inwards=inwards, material="pp")
+    assert spec.strain == pytest.approx(bent_on_its_arc(spec), rel=0.02)
+    straight = SnapSpec(length=8, material="pp").strain
+    assert (spec.strain > straight) == (not inwards or spec.shift(8) > 0.5)
+
+
+def test_an_arc_that_bends_too_far_is_refused():
+    SnapTongue(SnapSpec(length=8))
+    with pytest.raises(HingeError, match="farther from the axis"):
+        SnapTongue(SnapSpec(length=8, arc=120))
+    SnapTongue(SnapSpec(length=8, arc=120, inwards=True))
+    with pytest.raises(HingeError, match="arc 5 mm must be above the tongue's length"):
+        SnapTongue(SnapSpec(length=8, arc=5))
