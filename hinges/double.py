@@ -19,6 +19,7 @@ from build123d import (
 )
 
 from .clearance import Clearance
+from .double_poses import colliding_poses
 from .exact_solids import build_all, build_half, build_shape, one_part
 from .exceptions import HingeError
 from .leaf import Bracket
@@ -249,6 +250,15 @@ class DoubleHinge(PlacedPart):
     def child_carve(self) -> Part:
         """What the child's body, in the drawn pose, gives up."""
         return self._carved("child")
+
+    @property
+    def colliding_poses(self) -> tuple[tuple[float, float], ...]:
+        """Pairs of angles, in steps of 90°, at which the two boxes would take one another's room.
+
+        Both axes turn on their own, so the hinge does not keep them from it: a hinge that turns by
+        270° cannot stand at 270/0, nor one with both axes on one edge at 180/90.
+        """
+        return colliding_poses(self.spec)
 
     @property
     def hardware(self) -> Part | None:

@@ -83,7 +83,7 @@ def test_no_profile_is_overwritten(tmp_path):
     with pytest.raises(RecipeError, match="is there already"):
         write_profile(tmp_path / "mine.toml", mine)
     assert (tmp_path / "mine.toml").read_text() == "precious"
-    with pytest.raises(RecipeError, match="a profile.s file ends"):
+    with pytest.raises(RecipeError, match="file ends in"):
         write_profile(tmp_path / "mine.txt", mine)
 
 

@@ -153,3 +153,21 @@ def test_meshes_are_deterministic_copies():
     assert single_hinge_meshes(20, 0.3).parent_half.vertices.any()
     assert one.parent_half.faces.dtype == np.int32
     assert (one.barrel_radius_mm, one.pin_radius_mm) == (2.5, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "poses"),
+    [
+        ({}, ()),
+        ({"second": "+z", "turns": (180, 90)}, ()),
+        ({"turns": (270, 180)}, ((270.0, 0.0),)),
+        ({"second": "+y", "turns": (180, 90), "knuckles": 5}, ((180.0, 90.0),)),
+    ],
+)
+def test_poses_in_which_the_boxes_meet_are_told(keywords, poses):
+    hinge = DoubleHinge(40, clearance=0.3, **keywords)
+    assert set(poses) <= set(hinge.colliding_poses)
+    for first in range(0, int(hinge.spec.turns[0]) + 1, 90):
+        for second in range(0, int(hinge.spec.turns[1]) + 1, 90):
+            apart = boxes_apart(hinge.plan, first, second)
+            assert ((first, second) in hinge.colliding_poses) == (not apart)
