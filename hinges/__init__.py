@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .double import DoubleHinge as DoubleHinge
     from .double import DoubleHingeCarve as DoubleHingeCarve
     from .double import DoubleHingePart as DoubleHingePart
+    from .edges import hinge_location as hinge_location
     from .exceptions import FitError as FitError
     from .exceptions import HingeError as HingeError
     from .exceptions import KernelError as KernelError
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from .single import HingeCarve as HingeCarve
     from .single import HingeHalf as HingeHalf
     from .single import SingleHinge as SingleHinge
-    from .single import hinge_location as hinge_location
     from .stops import Detents as Detents
     from .stops import Stops as Stops
     from .tolerance_coupon import Coupon as Coupon
@@ -77,7 +77,7 @@ _HOMES = {
     "SnapTongue": "retention",
     "Stops": "stops",
     "StraightPin": "printed_pins",
-    "hinge_location": "single",
+    "hinge_location": "edges",
     "play": "joint_play",
     "total_play": "joint_play",
     "write_coupon": "tolerance_coupon",

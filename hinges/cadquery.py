@@ -19,10 +19,13 @@ method                              what it does at every point of the stack
 ``cutHinge(side, length, ...)``     cuts what one body gives up
 ==================================  ===============================================================
 
-Where the stack holds solids instead of points, the place is the origin of the workplane. The
-hinge's axis is the local z of each point, x points from parent to child and y out of the face
-that they share; see :class:`hinges.SingleHinge` for the other parameters. Shapes pass both ways as
-handles of the one kernel: nothing is copied or written to disk.
+Where the stack holds solids instead of points, the place is the origin of the workplane. Where it
+holds edges, ``edges(">Y and >Z").hingeParent(60, outwards=(0, 0, 1))`` lays the hinge along them:
+half a gap off the edge, y in the direction ``outwards``. Its axis is tagged "hinge", so that an
+assembly closes by constraints: ``constrain("box?hinge", "lid?hinge", "Axis", 0)`` and "Point".
+For points the axis is the local z of each point, x points from parent to child and y out of the
+face that they share; see :class:`hinges.SingleHinge` for the other parameters. Shapes pass both
+ways as handles of the one kernel: nothing is copied or written to disk.
 """
 
 from __future__ import annotations
@@ -38,6 +41,8 @@ check_kernel(cadquery=True)
 
 import cadquery as cq  # noqa: E402
 
+from .cadquery_shapes import edge_place, from_cadquery, to_cadquery  # noqa: E402
+
 __all__ = [
     "METHODS",
     "child_of",
@@ -46,56 +51,6 @@ __all__ = [
     "parent_of",
     "to_cadquery",
 ]
-
-
-def to_cadquery(part: Any) -> cq.Shape:
-    """Hand a build123d shape to CadQuery.
-
-    Parameters
-    ----------
-    part : build123d Shape
-        What to hand over.
-
-    Returns
-    -------
-    cadquery Shape
-        Shape of the matching class, on the same kernel object. A part of one solid comes as a
-        Solid.
-    """
-    solids = part.solids() if hasattr(part, "solids") else []
-    return cq.Shape.cast(solids[0].wrapped if len(solids) == 1 else part.wrapped)
-
-
-def from_cadquery(shape: Any) -> Any:
-    """Hand a CadQuery shape, or the solids of a Workplane, to build123d.
-
-    Parameters
-    ----------
-    shape : cadquery Shape or Workplane
-        What to hand over.
-
-    Returns
-    -------
-    build123d Part
-        Part on the same kernel objects.
-
-    Raises
-    ------
-    HingeError
-        If there is no solid in it.
-    """
-    import build123d as bd
-
-    if isinstance(shape, cq.Workplane):
-        solids = [one for value in shape.vals() if isinstance(value, cq.Shape) for one in value]
-        found = [solid for one in solids for solid in one.Solids()] or [
-            solid for value in shape.vals() for solid in value.Solids()
-        ]
-    else:
-        found = shape.Solids()
-    if not found:
-        raise HingeError("there is no solid in this CadQuery shape")
-    return bd.Part([bd.Solid(solid.wrapped) for solid in found])
 
 
 def _single(length: float, options: SingleHingeKeywords) -> Any:
@@ -286,20 +241,33 @@ def cut_hinge(
 
 
 def _fitted(
-    self: cq.Workplane, side: str, length: float, options: SingleHingeKeywords
+    self: cq.Workplane,
+    side: str,
+    length: float | None,
+    outwards: tuple[float, float, float] | None,
+    options: SingleHingeKeywords,
 ) -> cq.Workplane:
+    edges = [one for one in self.objects if isinstance(one, cq.Edge)]
+    if length is None:
+        if not edges:
+            raise HingeError("give the length: only an edge on the stack tells it")
+        length = edges[0].Length()
     half, carve = _half_and_carve(side, length, options)
+    gap = _single(length, options).spec.gap
     cutters, added = _pieces(carve), _pieces(half)
     body = self.findSolid()
     before = len(body.Solids())
-    # Each point of the stack, in global coordinates, as a place for the hinge.
-    places = [
-        location
-        for shape in _points(self)
-        .eachpoint(lambda place: cq.Vertex.makeVertex(0, 0, 0).moved(place), True)
-        .vals()
-        for location in [shape.location()]
-    ]
+    if edges:
+        places = [edge_place(body, edge, side, outwards, gap) for edge in edges]
+    else:
+        # Each point of the stack, in global coordinates, as a place for the hinge.
+        places = [
+            location
+            for shape in _points(self)
+            .eachpoint(lambda place: cq.Vertex.makeVertex(0, 0, 0).moved(place), True)
+            .vals()
+            for location in [shape.location()]
+        ]
     for place in places:
         body = body.cut(*(piece.moved(place) for piece in cutters))
         body = body.fuse(*(piece.moved(place) for piece in added))
@@ -309,11 +277,21 @@ def _fitted(
             "reach the bracket of its half, and the carve must not cut it in two"
         )
     solids = body.Solids()
+    # The line of each axis, for constraints of an assembly; both halves have it the same way round.
+    axes = [
+        cq.Edge.makeLine(cq.Vector(0, 0, -0.5 * length), cq.Vector(0, 0, 0.5 * length)).moved(place)
+        for place in places
+    ]
+    for number, axis in enumerate(axes, start=1):
+        self.newObject([axis]).tag("hinge" if number == 1 else f"hinge {number}")
     return self.newObject([solids[0] if len(solids) == 1 else body])
 
 
 def hinge_parent(
-    self: cq.Workplane, length: float, **options: Unpack[SingleHingeKeywords]
+    self: cq.Workplane,
+    length: float | None = None,
+    outwards: tuple[float, float, float] | None = None,
+    **options: Unpack[SingleHingeKeywords],
 ) -> cq.Workplane:
     """Let the parent's half into the solid under construction at every point of the stack.
 
@@ -321,8 +299,10 @@ def hinge_parent(
     ----------
     self : Workplane
         The workplane that it is a method of.
-    length : float
-        Length in mm of the edge that the hinge is for.
+    length : float, optional
+        Length in mm of the edge that the hinge is for; that of the edge on the stack when left out.
+    outwards : (float, float, float), optional
+        Where the stack holds edges: direction out of both bodies.
     **options
         The other keywords of :class:`hinges.SingleHinge`.
 
@@ -336,11 +316,14 @@ def hinge_parent(
     HingeError
         If the hinge cannot be made, or the body does not reach its half.
     """
-    return _fitted(self, "parent", length, options)
+    return _fitted(self, "parent", length, outwards, options)
 
 
 def hinge_child(
-    self: cq.Workplane, length: float, **options: Unpack[SingleHingeKeywords]
+    self: cq.Workplane,
+    length: float | None = None,
+    outwards: tuple[float, float, float] | None = None,
+    **options: Unpack[SingleHingeKeywords],
 ) -> cq.Workplane:
     """Let the child's half into the solid under construction at every point of the stack.
 
@@ -348,8 +331,10 @@ def hinge_child(
     ----------
     self : Workplane
         The workplane that it is a method of.
-    length : float
-        Length in mm of the edge that the hinge is for.
+    length : float, optional
+        Length in mm of the edge that the hinge is for; that of the edge on the stack when left out.
+    outwards : (float, float, float), optional
+        Where the stack holds edges: direction out of both bodies.
     **options
         The other keywords of :class:`hinges.SingleHinge`.
 
@@ -363,7 +348,7 @@ def hinge_child(
     HingeError
         If the hinge cannot be made, or the body does not reach its half.
     """
-    return _fitted(self, "child", length, options)
+    return _fitted(self, "child", length, outwards, options)
 
 
 def parent_of(

@@ -97,6 +97,8 @@ class SingleHingeKeywords(BarrelKeywords, total=False):
     leaf: Bracket | Leaf | None
     angle: float
     angular_range: tuple[float, float]
+    opens: float | None
+    closed: float
     stops: Stops | bool | None
     detents: Detents | None
     friction: float | None
@@ -110,6 +112,8 @@ class SingleHingeOptions(BarrelOptions):
     leaf: Bracket | Leaf | None = None
     angle: float = 0.0
     angular_range: tuple[float, float] = (0.0, 180.0)
+    opens: float | None = None
+    closed: float = 0.0
     stops: Stops | bool | None = None
     detents: Detents | None = None
     friction: float | None = None
@@ -120,6 +124,13 @@ class SingleHingeOptions(BarrelOptions):
         number(self.angle, "angle")
         words = "the lowest and the highest angle in degrees, such as (0, 110)"
         _require_pair(self.angular_range, "angular_range", words)
+        if number(self.closed, "closed") not in (0.0, 180.0):
+            raise HingeError(f"closed is {self.closed:g}: give 0 or 180")
+        if self.opens is not None:
+            if not 0.0 < number(self.opens, "opens") <= 180.0:
+                raise HingeError(f"opens is {self.opens:g}: give an angle above 0 and up to 180")
+            if self.stops is not None or tuple(self.angular_range) != (0.0, 180.0):
+                raise HingeError("opens stands for angular_range and stops: leave those out")
         if self.stops is not None and not isinstance(self.stops, (Stops, bool)):
             raise HingeError(
                 f"stops is {self.stops!r}: give True or Stops(...); the angle at which a stop "

@@ -75,16 +75,26 @@ class SingleSpec(BarrelSpec):
         sizes = dict(vars(barrel_spec(options, length, options.knuckles, (0.0, options.angle))))
         if options.margin is None and isinstance(options.leaf, Leaf):
             sizes["margin"] = 0.0
-        low, high = options.angular_range
+        low, high, stops = _range(options)
         return cls(
             length=float(length),
             leaf=Bracket() if options.leaf is None else options.leaf,
             angle=float(options.angle),
             angular_range=(float(low), float(high)),
-            stops=Stops() if options.stops is True else options.stops or None,
+            stops=stops,
             detents=_detents(options),
             **sizes,
         )
+
+
+def _range(options: SingleHingeOptions) -> tuple[float, float, Stops | None]:
+    """Lowest and highest angle, and the stops there."""
+    if options.opens is None:
+        stops = Stops() if options.stops is True else options.stops or None
+        return (*options.angular_range, stops)
+    if options.closed == 0.0:
+        return 0.0, options.opens, Stops()
+    return 180.0 - options.opens, 180.0, Stops(lower=True, upper=False)
 
 
 def _detents(options: SingleHingeOptions) -> Detents | None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, Unpack
 
 from build123d import (
     Align,
     BuildPart,
     Color,
+    Edge,
     Location,
     Mode,
     Part,
@@ -17,10 +18,10 @@ from build123d import (
     Rotation,
     RotationLike,
     Solid,
-    VectorLike,
 )
 
 from .clearance import Clearance
+from .edges import edge_frame
 from .exact_solids import build_all, build_half, build_shape, one_part
 from .exceptions import HingeError
 from .leaf import Bracket, Leaf
@@ -36,13 +37,12 @@ from .placement import (
 )
 from .plan_single import SinglePlan, SingleSpec, plan_single
 from .stops import Detents, Stops
+from .turn_check import require_turn
 from .turn_sweep import TurnSweep, single_sweep, spread
 
-__all__ = ["HingeCarve", "HingeHalf", "SingleHinge", "hinge_location"]
+__all__ = ["HingeCarve", "HingeHalf", "SingleHinge"]
 
 Side = Literal["parent", "child"]
-#: What bumps of detents and faces of stops may share with their partner, in mm³.
-_PRESSED = 0.5
 PARENT_COLOR = (0.20, 0.45, 0.70)
 CHILD_COLOR = (0.90, 0.55, 0.15)
 
@@ -70,36 +70,6 @@ def _side(side: str) -> Side:
     if side == "child":
         return "child"
     raise HingeError(f"side {side!r}: use 'parent' or 'child'")
-
-
-def hinge_location(origin: VectorLike, along: VectorLike, outwards: VectorLike) -> Location:
-    """Lay the hinge's frame on an edge of a part.
-
-    Parameters
-    ----------
-    origin : VectorLike
-        Middle of the edge, in mm.
-    along : VectorLike
-        Direction along the edge. The child's material is on the side ``outwards × along``.
-    outwards : VectorLike
-        Direction out of the two bodies, in the face that they share.
-
-    Returns
-    -------
-    Location
-        Where the hinge's frame lies: z along the edge, y outwards.
-
-    Raises
-    ------
-    HingeError
-        If the two directions are not at right angles.
-    """
-    from build123d import Vector
-
-    z_dir, y_dir = Vector(*along).normalized(), Vector(*outwards).normalized()
-    if abs(z_dir.dot(y_dir)) > 1e-6:
-        raise HingeError("the outward direction must be at right angles to the edge")
-    return Plane(origin=origin, x_dir=y_dir.cross(z_dir), z_dir=z_dir).location
 
 
 class SingleHinge(PlacedPart):
@@ -132,6 +102,12 @@ class SingleHinge(PlacedPart):
         Angle in degrees at which it is drawn and printed.
     angular_range : (float, float)
         Lowest and highest angle in degrees, within 0 to 180.
+    opens : float, optional
+        How far it opens, in degrees from the closed pose, with a stop there; in place of
+        `angular_range` and `stops`.
+    closed : {0, 180}
+        The angle at which it is closed, for `opens`: 0 where the lid lies on its box, 180 where
+        both lie side by side and fold onto one another.
     stops : Stops or bool, optional
         Lugs at the ends of the range; True for one at the upper end.
     detents : Detents, optional
@@ -195,6 +171,8 @@ class SingleHinge(PlacedPart):
         gap: float | None = None,
         angle: float = 0.0,
         angular_range: tuple[float, float] = (0.0, 180.0),
+        opens: float | None = None,
+        closed: float = 0.0,
         stops: Stops | bool | None = None,
         detents: Detents | None = None,
         friction: float | None = None,
@@ -216,6 +194,8 @@ class SingleHinge(PlacedPart):
             "gap": gap,
             "angle": angle,
             "angular_range": angular_range,
+            "opens": opens,
+            "closed": closed,
             "stops": stops,
             "detents": detents,
             "friction": friction,
@@ -295,6 +275,7 @@ class SingleHinge(PlacedPart):
         at: Location | Plane | None = None,
         joint: str = "hinge",
         *,
+        edge: Edge | None = None,
         check: bool = True,
     ) -> tuple[Part, Part]:
         """Let the hinge into two bodies.
@@ -305,9 +286,12 @@ class SingleHinge(PlacedPart):
             The bodies in the drawn pose. Each keeps at least half the gap inside its quadrant:
             away from the face that they share, and from the one that they fold together on.
         at : Location or Plane, optional
-            Where the hinge lies, see :func:`hinge_location`; where it is when left out.
+            Where the hinge lies, see :func:`hinges.hinge_location`; where it is when left out.
         joint : str
             Name of the joints on both bodies; for a body with several hinges.
+        edge : Edge, optional
+            A straight edge of either body, in place of `at`: axis and outward side follow from it
+            and from where the other body lies.
         check : bool
             Whether the bodies are turned through the range and measured.
 
@@ -328,7 +312,12 @@ class SingleHinge(PlacedPart):
         -----
         What would stand out of a body of its bracket is trimmed.
         """
+        if edge is not None and at is not None:
+            raise HingeError("fit: give either the edge or the place, not both")
         place = frame_at(at)
+        if edge is not None:
+            turned = self._at_angle_0(child)
+            place = edge_frame(parent, turned, edge, self.spec.gap) * self.place.inverse()
         frame = place * self.place
         bodies = {"parent": one_body(parent, "parent"), "child": one_body(child, "child")}
         require_free_joint(tuple(bodies.items()), joint)
@@ -344,8 +333,35 @@ class SingleHinge(PlacedPart):
         HingeJoint(joint, made[0], frame, spec.angular_range)
         FixedJoint(joint, made[1], frame * Rotation(0, 0, spec.angle))
         if check:
-            self._require_turn(made[0], made[1], joint)
+            require_turn(self.spec, made[0], made[1], joint)
         return made[0], made[1]
+
+    @classmethod
+    def along(cls, edge: Edge, **options: Unpack[SingleHingeKeywords]) -> SingleHinge:
+        """Make a hinge as long as an edge.
+
+        Parameters
+        ----------
+        edge : Edge
+            The edge that ``fit(..., edge=edge)`` will lay it on.
+        **options
+            The other keywords of the class.
+
+        Returns
+        -------
+        SingleHinge
+            The hinge.
+        """
+        return cls(edge.length, **options)
+
+    def _at_angle_0(self, child: Part | Solid | BuildPart) -> Part | Solid | BuildPart:
+        """Refuse to guess an axis about which the child has been turned."""
+        if self.spec.angle:
+            raise HingeError(
+                f"the hinge is drawn at {self.spec.angle:g}°: an edge tells the axis where both "
+                "bodies lie at 0°; give the place with hinge_location"
+            )
+        return child
 
     def sweep(
         self,
@@ -378,48 +394,6 @@ class SingleHinge(PlacedPart):
         wanted = spread(*self.spec.angular_range, 5.0) if angles is None else angles
         frames = parent.joints[joint].location, child.joints[joint].location
         return single_sweep(parent, child, frames, wanted)
-
-    def _require_turn(self, parent: Part, child: Part, joint: str) -> None:
-        """Refuse bodies that meet as they turn, or that print in one piece."""
-        spec = self.spec
-        least = 0.5 * min(spec.gap, spec.clearance.least)
-        frames = parent.joints[joint].location, child.joints[joint].location
-        angles = (spec.angle, *spread(*spec.angular_range, 15.0))
-        swept = single_sweep(parent, child, frames, angles, least)
-        worst, drawn = swept.worst, swept.poses[0]
-        if worst.overlap <= _PRESSED:
-            if spec.pin.printed and drawn.gap < least:
-                raise HingeError(
-                    f"at the drawn angle the bodies are {drawn.gap:.3g} mm apart and print in one "
-                    f"piece: keep each half a gap ({0.5 * spec.gap:g} mm) inside its quadrant, "
-                    "away from the face that they share and from the outer one"
-                )
-            return
-        # Seen from the hinge's frame, the child as it lies at angle 0.
-        boxes = [
-            body.moved(body.joints[joint].location.inverse()).bounding_box()
-            for body in (parent, child)
-        ]
-        tops = [box.max.Y - 0.5 * spec.gap for box in boxes]
-        high = max(range(2), key=lambda index: tops[index])
-        if boxes[0].center().X > 0.0 > boxes[1].center().X:
-            advice = (
-                "parent and child lie the wrong way round: swap them, or turn the direction along "
-                "the edge about"
-            )
-        elif tops[high] > spec.radius + 0.1:
-            advice = (
-                f"the {('parent', 'child')[high]} reaches {tops[high]:.3g} mm outwards beyond the "
-                "axis: put the axis on its outer edge, or give the angular_range that it can turn"
-            )
-        else:
-            advice = (
-                "keep both in their quadrants beside and below the axis, or give the "
-                "angular_range that they can turn"
-            )
-        raise HingeError(
-            f"at {worst.angle:.4g}° the bodies overlap by {worst.overlap:.4g} mm³: {advice}"
-        )
 
 
 class HingeHalf(PlacedPart):

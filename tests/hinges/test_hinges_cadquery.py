@@ -104,3 +104,59 @@ def test_no_name_is_overridden(monkeypatch, cq, plugin):
     importlib.reload(plugin)
     assert cq.Workplane().singleHinge() == "mine"
     assert set(plugin.METHODS) >= {"singleHinge", "doubleHinge", "hingeParent", "hingeChild"}
+
+
+def lidded(cq):
+    box = cq.Workplane().box(60, 39.7, 36).translate((0, -20, 0))
+    lid = cq.Workplane().box(60, 39.7, 36).translate((0, 20, 0))
+    box = box.edges(">Y and >Z").hingeParent(outwards=(0, 0, 1), clearance=0.3)
+    return box, lid.edges("<Y and >Z").hingeChild(outwards=(0, 0, 1), clearance=0.3)
+
+
+def test_a_hinge_lies_along_an_edge(cq, plugin):
+    from build123d import Box, Pos
+
+    from hinges import SingleHinge, hinge_location
+
+    box, lid = lidded(cq)
+    want = SingleHinge(60, clearance=0.3).fit(
+        Pos(0, -20, 0) * Box(60, 39.7, 36),
+        Pos(0, 20, 0) * Box(60, 39.7, 36),
+        hinge_location((0, 0, 18.15), (1, 0, 0), (0, 0, 1)),
+    )
+    for made, other in zip((box, lid), want, strict=True):
+        assert made.val().isValid()
+        assert made.solids().size() == 1
+        bounds = made.val().BoundingBox()
+        assert bounds.zmax == pytest.approx(other.bounding_box().max.Z, abs=1e-3)
+        assert bounds.xlen == pytest.approx(60, abs=1e-3)
+    assert box.val().distance(lid.val()) == pytest.approx(0.3, abs=1e-6)
+
+
+@pytest.mark.parametrize(("angle", "top"), [(0, 180), (180, 0)])
+def test_an_assembly_closes_by_constraints(cq, plugin, angle, top):
+    box, lid = lidded(cq)
+    far = cq.Location(cq.Vector(100, 50, 20), cq.Vector(1, 1, 0), 40)
+    whole = cq.Assembly().add(box, name="box").add(lid, name="lid", loc=far)
+    whole.constrain("box", "Fixed")
+    whole.constrain("box?hinge", "lid?hinge", "Point")
+    whole.constrain("box?hinge", "lid?hinge", "Axis", param=0)
+    whole.constrain("box@faces@<Z", "lid@faces@<Z", "Axis", param=180 - top)
+    whole.solve()
+    placed = lid.val().moved(whole.children[1].loc)
+    bounds = placed.BoundingBox()
+    if angle == 0:
+        assert (bounds.ymin, bounds.zmin) == pytest.approx((-3.0, -18), abs=0.01)
+    else:
+        assert bounds.zmax == pytest.approx(18.3 + 36, abs=0.01)
+    assert box.val().intersect(placed).Volume() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_edges_without_a_direction_are_refused(cq, plugin):
+    box = cq.Workplane().box(60, 39.7, 36)
+    with pytest.raises(HingeError, match=r"needs the direction out of both bodies"):
+        box.edges(">Y and >Z").hingeParent(60)
+    with pytest.raises(HingeError, match="no face at the edge looks in the direction"):
+        box.edges(">Y and >Z").hingeParent(60, outwards=(1, 0, 0))
+    with pytest.raises(HingeError, match="give the length"):
+        box.hingeParent()
