@@ -266,6 +266,25 @@ _stage(
 _stage("export", "Make the whole kit: 3MF, STEP, STL, animation and report.")
 
 
+@app.command()
+@_guarded
+def inspect(
+    source: Annotated[str, typer.Argument(metavar="MODEL", help="A model file, or sample:NAME.")],
+    object: ObjectName = None,
+    as_json: Json = False,
+) -> None:
+    """Say what a model file is: format, size, colours, repairs, and the boxes that suit it."""
+    from fabfold.cli.console import show_inspection
+    from fabfold.samples.builtin import PREFIX, load_sample
+    from fabfold.solid.inspection import inspect_model, inspect_solid
+
+    if source.startswith(PREFIX):
+        found = inspect_solid(load_sample(source.removeprefix(PREFIX)), source)
+    else:
+        found = inspect_model(Path(source), object or "")
+    show_inspection(found, as_json=as_json)
+
+
 @app.command("list")
 @_guarded
 def list_things(

@@ -20,8 +20,9 @@ from fabfold.progress import Progress, processor_seconds
 if TYPE_CHECKING:
     from fabfold.kit.kit import Kit
     from fabfold.printing.checks import Check
+    from fabfold.solid.inspection import Inspection
 
-__all__ = ["ConsoleListener", "show_checks", "show_list", "show_result"]
+__all__ = ["ConsoleListener", "show_checks", "show_inspection", "show_list", "show_result"]
 
 _TITLES = {
     "solid": "Reading the model",
@@ -202,6 +203,37 @@ def show_checks(checks: Sequence[Check], about: Mapping[str, str], *, as_json: b
     console.print(table)
     passed = sum(check.ok for check in checks)
     console.print(f"{', '.join(about.values())}: {passed} of {len(checks)} checks passed")
+
+
+def show_inspection(found: Inspection, *, as_json: bool) -> None:
+    """Print what a model is, as sentences or as JSON."""
+    if as_json:
+        print(json.dumps(found.to_json(), ensure_ascii=False))
+        return
+    unit = "" if found.units == "none" else f" {found.units}"
+    painted = found.painted
+    colours = ", ".join(painted) if isinstance(painted, list) else "one or none"
+    size = " x ".join(f"{side:.4g}" for side in found.size)
+    lines = {
+        "file": f"{found.file}, {found.format}, {found.triangles:,} triangles",
+        "size": f"{size}{unit}" + ("" if unit else " (the file names no unit)"),
+        "volume": f"{found.volume:.5g}" + (f"{unit}³" if unit else ""),
+        "pieces": f"{found.pieces}",
+        "colours": colours,
+        "thin": f"{found.thin_share:.0%} of the surface, with 64 voxels",
+        "boxes": ", ".join(found.templates),
+    }
+    if found.objects:
+        lines["objects"] = ", ".join(
+            f"{number}: {name}" for number, name in enumerate(found.objects, start=1)
+        )
+    console = Console(highlight=False, soft_wrap=True)
+    for name, text in lines.items():
+        console.print(f"{name:8} {text}", markup=False)
+    for note in found.notes:
+        console.print(f"note: {note}", markup=False)
+    if found.thin_share > 0.1:
+        console.print("note: thin parts are thickened where they have to be (--thicken)")
 
 
 def show_pareto(kit: Kit) -> None:

@@ -46,6 +46,8 @@ class Solid:
         Digest of the input file (of the sample's name and version for samples).
     paint : Paint or None
         Painted faces; None where the file has one colour or none.
+    pieces : int
+        Separate pieces of material that the file had; what was made of them is one.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Solid:
     notes: tuple[str, ...] = field(default=())
     sha256: str = ""
     paint: Paint | None = None
+    pieces: int = 1
 
     @property
     def volume(self) -> float:

@@ -197,6 +197,7 @@ def solid_from_mesh(name: str, raw: RawMesh, sha256: str = "", label: str = "") 
         notes=tuple(notes),
         sha256=sha256 or hashlib.sha256(raw.vertices.tobytes() + raw.faces.tobytes()).hexdigest(),
         paint=painted_faces(raw.vertices, raw.faces, raw.colours),
+        pieces=len(united.decompose()),
     )
 
 

@@ -50,6 +50,8 @@ class RawMesh:
         Vertices and faces of what is taken away from the solid.
     objects : tuple of str
         Names of the objects that the file has, where it can have several.
+    unit : str
+        Unit of length that the file names; empty where it names none.
     """
 
     vertices: NDArray[np.float64]
@@ -59,6 +61,7 @@ class RawMesh:
     colours: NDArray[np.uint8] | None = None
     negative: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None
     objects: tuple[str, ...] = ()
+    unit: str = ""
 
 
 def no_faces(name: str, found: str = "") -> ModelError:

@@ -20,6 +20,15 @@ __all__ = ["MAX_TRIANGLES_EXPANDED", "read_3mf"]
 MAX_TRIANGLES_EXPANDED, MAX_USES = 6_000_000, 200_000
 #: Objects that are no material: helpers of slicers and CAD programs.
 _HELPERS = ("support", "solidsupport", "other", "surface")
+#: Units of a 3MF file, in short.
+_UNITS = {
+    "micron": "µm",
+    "millimeter": "mm",
+    "centimeter": "cm",
+    "meter": "m",
+    "inch": "in",
+    "foot": "ft",
+}
 #: An object's address: the part that it is in, and its number.
 _Address = tuple[str, int]
 
@@ -127,6 +136,7 @@ class _Reader:
             colours=self._solid.shades(),
             negative=self._negative.mesh() if self._negative.faces else None,
             objects=() if wanted else tuple(names),
+            unit=_UNITS.get(root.unit, root.unit),
         )
 
     def _told(self) -> list[str]:

@@ -142,6 +142,7 @@ def read_glb(path: Path) -> RawMesh:
         ("turned from the y-up of GLB files to z up",),
         float32=True,
         colours=colours_of_mesh(mesh),
+        unit="m",
     )
 
 

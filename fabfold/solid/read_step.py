@@ -69,7 +69,7 @@ def read_step(path: Path) -> RawMesh:
     notes = [f"the file has {solids} separate solids"] if solids > 1 else []
     if solids == 0:
         notes.append("the file has surfaces only, no solid; they were taken for its skin")
-    return RawMesh(vertices, faces, tuple(notes))
+    return RawMesh(vertices, faces, tuple(notes), unit="mm")
 
 
 def _check(path: Path) -> None:

@@ -27,7 +27,7 @@ from fabfold.solid.union import MAX_TRIANGLES
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["InnerBalls", "Thickened", "inner_balls", "thickened"]
+__all__ = ["InnerBalls", "Thickened", "inner_balls", "thickened", "thin_share"]
 
 Floats = NDArray[np.float64]
 
@@ -175,6 +175,20 @@ def thickened(solid: Solid, thickness: float) -> Thickened:
         2 * _least(balls.centres[thin], balls.radii[thin], radius),
         float(thin.mean()),
     )
+
+
+def thin_share(solid: Solid, thickness: float) -> float:
+    """Share of a solid's surface that lies on parts thinner than wanted.
+
+    Parameters
+    ----------
+    solid : Solid
+        The model.
+    thickness : float
+        Least thickness that is wanted, model units.
+    """
+    radius = thickness / 2
+    return float(_thin(inner_balls(solid.vertices, solid.faces, radius), radius).mean())
 
 
 def _samples(vertices: Floats, faces: NDArray[np.int32], radius: float) -> tuple[Floats, Floats]:
