@@ -1,9 +1,11 @@
-"""The tolerance coupon: a plate of hinges at several clearances, to find what a printer needs.
+"""The tolerance coupon: a strip of hinges at several clearances, to find what a printer needs.
 
-One row of single hinges and one of double hinges (two axes in a row) hang on one frame that carries
-their clearances in raised numbers. The plate prints lying, without support. One turns every flap
-and notes the smallest number whose flaps move freely. :func:`write_coupon` writes the plate for a
-slicer or for CAD, and a page that tells how to read it.
+A row of small hinges and a row of hexagonal sockets hang on one frame that carries their clearances
+in raised numbers; a loose hexagonal plug lies beside it. The strip prints lying, without support,
+in well under an hour. One turns every flap and notes the smallest number whose flap moves freely;
+the plug tells the same for fits that do not turn. :func:`write_coupon` writes the strip for a
+slicer or for CAD, and a page that tells how to read it. In files for a slicer the first layer
+stands back from every gap, so that it is not the elephant's foot that is measured.
 """
 
 from __future__ import annotations
@@ -28,23 +30,33 @@ from .leaf import Leaf
 from .mesh import MeshPart, half_manifolds, manifold_of, mesh_part
 from .plan_double import Matrix
 from .plan_single import SinglePlan, SingleSpec, plan_single
-from .shapes import HalfPlan, Shape, box
+from .shapes import HalfPlan, Prism, Shape, box, regular
 
 if TYPE_CHECKING:
     from build123d import RotationLike
 
-__all__ = ["DEFAULT_CLEARANCES", "Coupon", "write_coupon"]
+__all__ = ["DEFAULT_CLEARANCES", "FINE_STEP", "Coupon", "fine_clearances", "write_coupon"]
 
 DEFAULT_CLEARANCES: Final[tuple[float, ...]] = (0.15, 0.20, 0.25, 0.30, 0.35, 0.40, 0.45, 0.50)
 """Clearances of a coupon in mm."""
 
+FINE_STEP: Final = 0.025
+"""Step of a second coupon in mm."""
+
 _COLUMNS = 3  # how many clearances the page shows
 
-_THICK = 1.9  # of frame, leaves and flaps, mm
-_SPINE = 14.0  # width of the frame, mm
-_STAND = 5.0  # from the frame to the first axis, mm
-_FLAP = 7.0  # from an axis to the end of a flap, mm
-_LINK = 12.0  # between the two axes of a double hinge, mm
+# Sizes of a coupon with barrels of 2.5 mm radius, in mm; larger clearances want larger barrels.
+_RADIUS = 2.5
+_LENGTH = 12.0  # of a hinge
+_SCALES = (1.0, 1.2, 1.4, 1.7, 2.0)
+_THICK = 1.0  # of frame and flaps
+_SPINE = 5.6  # width of the frame
+_STAND = 3.4  # from the frame to the axis
+_FLAP = 4.6  # from the axis to the end of a flap
+_PLUG, _PLUG_HIGH = 5.0, 5.0  # across flats and height of the hexagonal plug
+_RING, _RING_HIGH = 0.85, 1.8  # wall and height of a socket
+#: How far the first layers stand back, and how high.
+_RELIEF, _RELIEF_HIGH = 0.25, 0.3
 
 
 @dataclass(frozen=True)
@@ -76,35 +88,81 @@ def _frame(x: float, y: float, z: float, side: float) -> Matrix:
     return matrix
 
 
-def _plan(clearance: float, length: float, width: float, wall: float) -> SinglePlan:
+def fine_clearances(around: float) -> tuple[float, ...]:
+    """Clearances of a second coupon, about what the first one gave.
+
+    Parameters
+    ----------
+    around : float
+        The middle one, in mm.
+
+    Returns
+    -------
+    tuple of float
+        Seven of them, in steps of 0.025 mm.
+    """
+    return tuple(round(around + FINE_STEP * step, 3) for step in range(-3, 4))
+
+
+def _plan(clearance: float, scale: float, wall: float) -> SinglePlan:
     return plan_single(
         SingleSpec.read(
-            length,
-            radius=3.0,
+            _LENGTH * scale,
+            radius=_RADIUS * scale,
             clearance=Clearance(clearance),
-            leaf=Leaf(width, _THICK, flat=True),
+            leaf=Leaf(_FLAP * scale, _THICK, flat=True),
             wall=wall,
             chamfer=0.2,
         )
     )
 
 
-def plan_coupon(clearances: Sequence[float], length: float, wall: float) -> tuple[CouponBody, ...]:
+def _plans(clearances: Sequence[float], wall: float) -> tuple[float, list[SinglePlan]]:
+    """Plans of all hinges, and the scale at which the largest clearance still fits."""
+    refusal: FitError | None = None
+    for scale in _SCALES:
+        plans = []
+        for clearance in clearances:
+            try:
+                plans.append(_plan(clearance, scale, wall))
+            except FitError as error:
+                refusal = FitError(
+                    error.rule,
+                    f"coupon hinge at {clearance:g} mm: {error.rule}",
+                    error.value,
+                    error.limit,
+                    "leave this clearance out",
+                    error.unit,
+                )
+                break
+        else:
+            return scale, plans
+    assert refusal is not None
+    raise refusal
+
+
+def _socket(x: float, y: float, clearance: float) -> Prism:
+    """A hexagonal ring about the plug, with its flats across y."""
+    hole = regular(6, _PLUG + 2.0 * clearance, 0.0, 1.0, 0.0).outline
+    rim = regular(6, _PLUG + 2.0 * (clearance + _RING), 0.0, 1.0, 0.0).outline
+    place = [tuple((px + x, py + y) for px, py in outline) for outline in (rim, hole)]
+    return Prism(place[0], 0.0, _RING_HIGH, (place[1][::-1],))
+
+
+def plan_coupon(clearances: Sequence[float], wall: float = 0.8) -> tuple[CouponBody, ...]:
     """Plan every body of the coupon.
 
     Parameters
     ----------
     clearances : sequence of float
         Clearances in mm, at most three digits each.
-    length : float
-        Length of each hinge in mm.
     wall : float
         Thinnest wall in mm.
 
     Returns
     -------
     tuple of CouponBody
-        The frame first, then a flap, a link and the link's flap for each clearance.
+        The frame first, then the flap of each clearance, and the plug.
 
     Raises
     ------
@@ -115,45 +173,35 @@ def plan_coupon(clearances: Sequence[float], length: float, wall: float) -> tupl
     """
     if not clearances or len(set(clearances)) != len(clearances):
         raise HingeError("a coupon needs at least one clearance, and each only once")
-    pitch = length + 2.0
+    scale, plans = _plans(clearances, wall)
+    pitch = _LENGTH * scale + 1.2
     start = -0.5 * pitch * (len(clearances) - 1)
     half = 0.5 * pitch * len(clearances)
-    spine = box(-half, half, -0.5 * _SPINE, 0.5 * _SPINE, 0.0, _THICK)
-    shapes: list[Shape] = [spine]
+    edge = 0.5 * _SPINE
+    shapes: list[Shape] = [box(-half, half, -edge, edge, 0.0, _THICK)]
     halves: list[tuple[HalfPlan, Matrix]] = []
     flaps: list[CouponBody] = []
-    for index, clearance in enumerate(clearances):
+    for index, (clearance, plan) in enumerate(zip(clearances, plans, strict=True)):
         x = start + index * pitch
-        try:
-            first = _plan(clearance, length, _FLAP, wall)
-            linked = _plan(clearance, length, 0.5 * _LINK + 1.0, wall)
-        except FitError as error:
-            raise FitError(
-                error.rule,
-                f"coupon hinge at {clearance:g} mm: {error.rule}",
-                error.value,
-                error.limit,
-                "leave this clearance out, or use longer hinges",
-                error.unit,
-            ) from error
-        level = first.spec.leaf.limits(first.layout, first.spec.gap)[3]
-        near = 0.5 * _SPINE + _STAND
-        single = _frame(x, -near, level, -1.0)
-        lower = _frame(x, near, level, 1.0)
-        upper = _frame(x, near + _LINK, level, 1.0)
-        halves += [(first.parent, single), (linked.parent, lower)]
-        name = f"{clearance:.2f}"
-        flaps += [
-            CouponBody(f"single {name}", ((first.child, single),)),
-            CouponBody(f"link {name}", ((linked.child, lower), (linked.parent, upper))),
-            CouponBody(f"double {name}", ((first.child, upper),)),
-        ]
-        shapes += raised_number(name, x, 0.0, _THICK)
-    return (CouponBody("frame", tuple(halves), tuple(shapes)), *flaps)
+        level = plan.spec.leaf.limits(plan.layout, plan.spec.gap)[3]
+        frame = _frame(x, -edge - _STAND * scale, level, -1.0)
+        halves.append((plan.parent, frame))
+        flaps.append(CouponBody(f"flap {clearance:g}", ((plan.child, frame),)))
+        # The flats of the socket lie across y; it reaches a little into the frame.
+        reach = 0.5 * _PLUG + clearance + _RING
+        shapes.append(_socket(x, edge + reach - 0.4, clearance))
+        # Without the nought, so that there is room between two numbers.
+        digits = 2 if round(clearance, 2) == clearance else 3
+        text = f"{clearance:.{digits}f}".removeprefix("0")
+        shapes += raised_number(text, x, 0.0, _THICK, high=4.0, raised=0.4)
+    plug = regular(6, _PLUG, 0.0, _PLUG_HIGH, 0.0)
+    beside = tuple((px + half + _PLUG, py) for px, py in plug.outline)
+    loose = CouponBody("plug", (), (Prism(beside, 0.0, _PLUG_HIGH),))
+    return (CouponBody("frame", tuple(halves), tuple(shapes)), *flaps, loose)
 
 
 class Coupon(BasePartObject):  # type: ignore[misc]
-    """A plate of single and double hinges at several clearances, on one frame.
+    """A strip of hinges and sockets at several clearances, on one frame, and a plug.
 
     The bed is the plane z = 0, the numbers are raised on the frame along x.
 
@@ -161,8 +209,6 @@ class Coupon(BasePartObject):  # type: ignore[misc]
     ----------
     clearances : sequence of float
         Clearances in mm, each only once.
-    length : float
-        Length of each hinge in mm.
     wall : float
         Thinnest wall in mm.
     rotation, align, mode
@@ -188,20 +234,19 @@ class Coupon(BasePartObject):  # type: ignore[misc]
     --------
     >>> coupon = Coupon([0.2, 0.3])
     >>> coupon.names
-    ('frame', 'single 0.20', 'link 0.20', 'double 0.20', 'single 0.30', 'link 0.30', 'double 0.30')
+    ('frame', 'flap 0.2', 'flap 0.3', 'plug')
     """
 
     def __init__(
         self,
         clearances: Sequence[float] = DEFAULT_CLEARANCES,
-        length: float = 20.0,
         wall: float = 0.8,
         rotation: RotationLike = (0, 0, 0),
         align: Align | tuple[Align, Align, Align] | None = None,
         mode: Mode = Mode.ADD,
     ) -> None:
         self.clearances = tuple(clearances)
-        self._bodies = plan_coupon(self.clearances, length, wall)
+        self._bodies = plan_coupon(self.clearances, wall)
         self.names = tuple(body.name for body in self._bodies)
         super().__init__(part=self._built(), rotation=rotation, align=align, mode=mode)
         self.label = "hinge coupon"
@@ -283,7 +328,6 @@ def write_coupon(
     path: Path | str,
     clearances: Sequence[float] = DEFAULT_CLEARANCES,
     *,
-    length_mm: float = 20.0,
     wall_mm: float = 0.8,
     title: str = "Hinge coupon",
     guide: bool = True,
@@ -297,8 +341,6 @@ def write_coupon(
         File to write; its suffix decides the format: .3mf, .step, .stp or .stl.
     clearances : sequence of float
         Clearances in mm, each only once.
-    length_mm : float
-        Length of each hinge in mm.
     wall_mm : float
         Thinnest wall in mm.
     title : str
@@ -329,7 +371,7 @@ def write_coupon(
         raise HingeError(
             f"coupon file {target.name!r}: use a name that ends in {', '.join(sorted(writers))}"
         )
-    bodies = plan_coupon(clearances, length_mm, wall_mm)
+    bodies = plan_coupon(clearances, wall_mm)
     if bed_mm is not None:
         _require_bed(bodies, bed_mm)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -344,7 +386,7 @@ def write_coupon(
         page = target.with_name(f"{target.stem}-guide.pdf")
         part = page.with_name(f".part-{page.name}")
         try:
-            columns = plan_coupon(clearances[:_COLUMNS], length_mm, wall_mm)
+            columns = plan_coupon(clearances[:_COLUMNS], wall_mm)
             write_guide(part, tuple(clearances), one_part(coupon_solids(columns)), title)
             part.replace(page)
         finally:
@@ -369,10 +411,25 @@ def _require_bed(bodies: Sequence[CouponBody], bed_mm: tuple[float, float]) -> N
         )
 
 
+def _relieved(meshes: Sequence[MeshPart]) -> list[MeshPart]:
+    """The same bodies with their first layers standing back from every edge."""
+    import manifold3d as m3
+
+    made = []
+    for mesh in meshes:
+        solid = m3.Manifold(m3.Mesh64(mesh.vertices, mesh.faces.astype(np.uint64)))
+        foot = solid.slice(0.5 * _RELIEF_HIGH).offset(-_RELIEF, m3.JoinType.Miter)
+        low, high = np.array(solid.bounding_box()).reshape(2, 3)
+        wide = m3.CrossSection.square((high - low)[:2] + 2.0).translate(low[:2] - 1.0)
+        skirt = (wide - foot).extrude(_RELIEF_HIGH + 0.5).translate((0.0, 0.0, -0.5))
+        made.append(mesh_part((solid - skirt).simplify(1e-3)))
+    return made
+
+
 def _joined(bodies: Sequence[CouponBody]) -> MeshPart:
     """All bodies in one mesh, so that no slicer moves them apart."""
     vertices, faces, count = [], [], 0
-    for mesh in coupon_meshes(bodies):
+    for mesh in _relieved(coupon_meshes(bodies)):
         vertices.append(mesh.vertices)
         faces.append(mesh.faces + count)
         count += len(mesh.vertices)

@@ -44,8 +44,16 @@ def test_the_commands_write_coupon_and_profile(tmp_path, monkeypatch):
     done = run(app, ["coupon", "--profile", "fdm-pla-0.4", "-o", "coupon.stl"])
     assert done.exit_code == 0, done.output
     coupon = trimesh.load_mesh(tmp_path / "coupon.stl")
-    # A frame, and for each clearance the flap of a single hinge, and link and flap of a double one.
-    assert coupon.body_count == 1 + 3 * len(DEFAULT_CLEARANCES)
+    # A frame, a flap for each clearance, and the plug.
+    assert coupon.body_count == 1 + len(DEFAULT_CLEARANCES) + 1
+    done = run(app, ["coupon", "--around", "0.3", "-o", "fine.stl"])
+    assert done.exit_code == 0, done.output
+    assert trimesh.load_mesh(tmp_path / "fine.stl").body_count == 1 + 7 + 1
+    done = run(app, ["calibrate", "--turns-freely", "0.275", "--around", "0.3", "-o", "fine.toml"])
+    assert done.exit_code == 0, done.output
+    assert load_profile("fine.toml").clearance_mm == 0.275
+    assert run(app, ["coupon", "--around", "0.3", "--clearances", "0.3"]).exit_code == 2
+    assert run(app, ["coupon", "--around", "0.01"]).exit_code == 2
     done = run(app, ["coupon", "-o", "coupon.xyz"])
     assert done.exit_code == 2
     done = run(app, ["coupon", "--clearances", "0.2,x", "-o", "coupon.stl"])
@@ -66,14 +74,14 @@ def test_a_profile_for_bodies_apart_comes_back_with_the_clearance_that_was_read(
     [
         (0.9, {}, "this coupon has 0.15, 0.2"),
         (0.3, {"fuses_mm": 0.12}, "--fuses 0.12"),
-        (0.3, {"clearances": "0.6,0.7"}, "this coupon has 0.6, 0.7"),
+        (0.3, {"clearances": (0.6, 0.7)}, "this coupon has 0.6, 0.7"),
         (0.3, {"name": "../mine"}, "no name for a profile"),
     ],
 )
 def test_numbers_that_are_not_on_the_coupon_are_refused(turns, more, words):
     with pytest.raises(RecipeError, match=words):
         calibrate(load_profile("sls-pa12"), turns, **more)
-    mine = calibrate(load_profile("sls-pa12"), 0.7, fuses_mm=0.6, clearances="0.6,0.7")
+    mine = calibrate(load_profile("sls-pa12"), 0.7, fuses_mm=0.6, clearances=(0.6, 0.7))
     assert mine.clearance_mm == 0.7
 
 
@@ -90,7 +98,7 @@ def test_no_profile_is_overwritten(tmp_path):
 def test_a_coupon_larger_than_the_bed_is_refused(tmp_path):
     from fabfold.printing.profile_coupon import make_coupon
 
-    many = ",".join(f"{0.2 + 0.01 * step:.2f}" for step in range(36))
+    many = ",".join(f"{0.2 + 0.01 * step:.2f}" for step in range(30))
     with pytest.raises(RecipeError, match=r"the coupon is .* mm, and the bed 145 x 145 mm"):
         make_coupon(tmp_path / "coupon.3mf", "sla-tough", many)
     assert list(tmp_path.iterdir()) == []

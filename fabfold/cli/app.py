@@ -307,11 +307,15 @@ def coupon(
         str | None,
         typer.Option("--clearances", help="In mm, such as 0.2,0.3,0.4. Default: 0.15 to 0.50."),
     ] = None,
+    around: Annotated[
+        float | None,
+        typer.Option("--around", help="A second coupon in steps of 0.025 mm about this clearance."),
+    ] = None,
 ) -> None:
     """Make a tolerance coupon: hinges at several clearances, and how to read them."""
     from fabfold.printing.profile_coupon import make_coupon
 
-    for path in make_coupon(output, profile, clearances):
+    for path in make_coupon(output, profile, clearances, around):
         typer.echo(path)
 
 
@@ -333,6 +337,9 @@ def calibrate(
         str | None,
         typer.Option("--clearances", help="What the coupon was made with, where not the default."),
     ] = None,
+    around: Annotated[
+        float | None, typer.Option("--around", help="What the second coupon was made around.")
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="The new profile. Default: my-PROFILE.toml."),
@@ -341,11 +348,13 @@ def calibrate(
     """Write your own printer profile from a printed coupon; 'export --profile FILE' uses it."""
     from fabfold.printing.calibrate import calibrate as calibrated
     from fabfold.printing.calibrate import write_profile
+    from fabfold.printing.profile_coupon import coupon_clearances
     from fabfold.printing.profiles import DEFAULT_PROFILE, load_profile
 
     name = "" if output is None else output.stem
     known = load_profile(profile or DEFAULT_PROFILE)
-    mine = calibrated(known, turns_freely, fuses_mm=fuses, name=name, clearances=clearances)
+    values = coupon_clearances(clearances, around)
+    mine = calibrated(known, turns_freely, fuses_mm=fuses, name=name, clearances=values)
     path = output or Path(f"{mine.name}.toml")
     write_profile(path, mine)
     typer.echo(f"{path}: clearance {mine.clearance_mm:g} mm; use it with --profile {path}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import tomlkit
@@ -21,7 +22,7 @@ def calibrate(
     *,
     fuses_mm: float | None = None,
     name: str = "",
-    clearances: str | None = None,
+    clearances: Sequence[float] | None = None,
 ) -> Profile:
     """Profile with the clearance that a coupon of this printer needs.
 
@@ -37,8 +38,8 @@ def calibrate(
         clearance is kept.
     name : str, optional
         Name of the new profile; ``my-`` and the name of the shipped one by default.
-    clearances : str, optional
-        What the coupon was made with, with commas between; the default coupon's if left out.
+    clearances : sequence of float, optional
+        What the coupon was made with, mm; the default coupon's if left out.
 
     Returns
     -------
@@ -50,13 +51,13 @@ def calibrate(
     RecipeError
         If the figures contradict each other or are none of the coupon's, or the name is none.
     """
-    values = coupon_clearances(clearances)
+    values = coupon_clearances(None) if clearances is None else clearances
     for option, figure in (("--turns-freely", turns_freely_mm), ("--fuses", fuses_mm)):
         if figure is not None and not any(abs(figure - value) < 1e-6 for value in values):
             listed = ", ".join(f"{value:g}" for value in values)
             raise RecipeError(
                 f"{option} {figure:g}: give the number beside the hinge; this coupon has {listed} "
-                "(--clearances tells of another)"
+                "(--clearances or --around tells of another)"
             )
     if name and not re.fullmatch(r"[\w.-]+", name):
         raise RecipeError(f"{name!r} is no name for a profile: use letters, digits, - and _")

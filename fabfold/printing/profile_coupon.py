@@ -11,7 +11,10 @@ __all__ = ["coupon_clearances", "make_coupon"]
 
 
 def make_coupon(
-    path: Path, profile: str | None = None, clearances: str | None = None
+    path: Path,
+    profile: str | None = None,
+    clearances: str | None = None,
+    around: float | None = None,
 ) -> list[Path]:
     """Write a coupon whose walls suit a profile, with the page that tells how to read it.
 
@@ -23,6 +26,8 @@ def make_coupon(
         Name or file of a printer profile; the default profile if left out.
     clearances : str, optional
         Clearances of the coupon's hinges in mm, with commas between.
+    around : float, optional
+        What a first coupon gave, mm: a second one in finer steps about it.
 
     Returns
     -------
@@ -38,7 +43,7 @@ def make_coupon(
     from hinges.tolerance_coupon import write_coupon
 
     known = load_profile(profile or DEFAULT_PROFILE)
-    values = coupon_clearances(clearances)
+    values = coupon_clearances(clearances, around)
     title = f"Hinge coupon, {known.name}"
     try:
         bed = None if known.bed_mm is None else known.bed_mm[:2]
@@ -48,21 +53,29 @@ def make_coupon(
         raise RecipeError(str(error)) from None
 
 
-def coupon_clearances(text: str | None) -> tuple[float, ...]:
+def coupon_clearances(text: str | None, around: float | None = None) -> tuple[float, ...]:
     """Clearances of a coupon in mm.
 
     Parameters
     ----------
     text : str or None
         As given with ``--clearances``; None for the default coupon.
+    around : float, optional
+        Middle of a second coupon in finer steps, mm.
 
     Raises
     ------
     RecipeError
-        If these are no numbers.
+        If these are no numbers, or both are given.
     """
-    from hinges.tolerance_coupon import DEFAULT_CLEARANCES
+    from hinges.tolerance_coupon import DEFAULT_CLEARANCES, FINE_STEP, fine_clearances
 
+    if around is not None:
+        if text is not None:
+            raise RecipeError("--around and --clearances both say what to try: give one of them")
+        if not 3 * FINE_STEP < around <= 2.0:
+            raise RecipeError(f"--around {around:g}: give what the first coupon told, 0.1 to 2 mm")
+        return fine_clearances(around)
     if text is None:
         return DEFAULT_CLEARANCES
     try:

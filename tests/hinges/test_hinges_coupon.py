@@ -1,6 +1,6 @@
 """The tolerance coupon: bodies, gaps, overhangs, files."""
 
-from itertools import combinations
+from itertools import pairwise
 
 import lib3mf
 import manifold3d
@@ -11,46 +11,120 @@ from build123d import import_step
 from hinges import Coupon, FitError, HingeError
 from hinges.digits import raised_number
 from hinges.mesh import manifold_of
-from hinges.tolerance_coupon import DEFAULT_CLEARANCES, coupon_meshes, plan_coupon, write_coupon
+from hinges.tolerance_coupon import (
+    DEFAULT_CLEARANCES,
+    _relieved,
+    coupon_meshes,
+    fine_clearances,
+    plan_coupon,
+    write_coupon,
+)
 
 FEW = (0.2, 0.35)
 
 
-@pytest.fixture(scope="module")
-def solids():
-    meshes = coupon_meshes(plan_coupon(DEFAULT_CLEARANCES, 20.0, 0.8))
+def solids_of(meshes):
     return [
         manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices, mesh.faces.astype(np.uint64)))
         for mesh in meshes
     ]
 
 
-def test_one_frame_and_three_bodies_for_each_clearance(solids):
-    assert len(solids) == 1 + 3 * len(DEFAULT_CLEARANCES)
+@pytest.fixture(scope="module")
+def solids():
+    return solids_of(coupon_meshes(plan_coupon(DEFAULT_CLEARANCES)))
+
+
+def test_a_frame_a_flap_for_each_clearance_and_a_plug(solids):
+    assert len(solids) == 1 + len(DEFAULT_CLEARANCES) + 1
     assert all(len(solid.decompose()) == 1 for solid in solids)
     assert all(solid.bounding_box()[2] == pytest.approx(0.0, abs=1e-6) for solid in solids)
 
 
 def test_every_gap_is_the_number_on_the_frame(solids):
-    frame, rest = solids[0], solids[1:]
-    for index, clearance in enumerate(DEFAULT_CLEARANCES):
-        flap, link, double = rest[3 * index : 3 * index + 3]
-        for one, other in ((frame, flap), (frame, link), (link, double)):
-            assert (one ^ other).volume() == pytest.approx(0.0, abs=1e-9)
-            assert one.min_gap(other, clearance + 0.05) == pytest.approx(clearance, abs=0.005)
-        assert frame.min_gap(double, 1.0) == 1.0
-    for one, other in combinations(rest[::3], 2):
+    frame, *flaps, plug = solids
+    for flap, clearance in zip(flaps, DEFAULT_CLEARANCES, strict=True):
+        assert (frame ^ flap).volume() == pytest.approx(0.0, abs=1e-9)
+        assert frame.min_gap(flap, clearance + 0.05) == pytest.approx(clearance, abs=0.005)
+    for one, other in pairwise(flaps):
         assert one.min_gap(other, 1.0) >= 1.0
+    assert plug.min_gap(frame, 1.0) >= 1.0
+
+
+def test_the_plug_has_its_number_as_room_in_every_socket(solids):
+    frame, plug = solids[0], solids[-1]
+    low, high = np.array(plug.bounding_box()).reshape(2, 3)
+    home = plug.translate(tuple(-0.5 * (low + high) * (1, 1, 0)))
+    pitch = 13.2
+    for index, clearance in enumerate(DEFAULT_CLEARANCES):
+        reach = 2.5 + clearance + 0.85
+        place = (pitch * (index - 3.5), 2.8 + reach - 0.4, 0.0)
+        inside = home.translate(place)
+        assert (inside ^ frame).volume() == pytest.approx(0.0, abs=1e-9)
+        assert inside.min_gap(frame, 1.0) == pytest.approx(clearance, abs=1e-6)
 
 
 def test_flaps_turn_half_way_round_without_touching(solids):
     frame, flap = solids[0], solids[1]
-    # the axis: 12 mm from the frame's middle line, at the height of the barrels' centre
-    axis = np.array([0.0, -12.0, flap.bounding_box()[5] - 3.0])
+    # the axis: 6.2 mm from the frame's middle line, at the height of the barrels' centre
+    axis = np.array([0.0, -6.2, flap.bounding_box()[5] - 2.5])
     for angle in range(0, 181, 20):
         turned = flap.translate(tuple(-axis)).rotate((-angle, 0, 0)).translate(tuple(axis))
         assert (frame ^ turned).volume() == pytest.approx(0.0, abs=1e-9)
         assert frame.min_gap(turned, 0.3) >= 0.15 - 1e-6
+
+
+def test_the_first_layers_stand_back_from_every_gap():
+    bodies = plan_coupon(FEW)
+    plain, made = solids_of(coupon_meshes(bodies)), solids_of(_relieved(coupon_meshes(bodies)))
+    for before, after in zip(plain, made, strict=True):
+        assert len(after.decompose()) == 1
+        foot, above = after.slice(0.15), after.slice(0.35)
+        assert (foot - before.slice(0.15)).area() == pytest.approx(0.0, abs=1e-6)
+        assert above.area() == pytest.approx(before.slice(0.35).area(), rel=1e-3)
+    frame, flap = made[0], made[1]
+    # 0.2 mm between the two where they turn; on the bed a quarter more on either side.
+    grown = flap.slice(0.15).offset(0.2 + 2 * 0.25 - 0.02, manifold3d.JoinType.Round)
+    assert (grown ^ frame.slice(0.15)).area() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_it_is_small_and_lies_on_every_bed(solids):
+    assert sum(solid.volume() for solid in solids) < 5000.0
+    boxes = np.array([solid.bounding_box() for solid in solids])
+    size = boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0)
+    assert size[0] < 120
+    assert size[1] < 25
+
+
+def test_larger_clearances_get_larger_hinges():
+    bodies = plan_coupon((0.4, 0.7))
+    spec = [plan for body in bodies for plan, _ in body.halves]
+    assert len(spec) == 4
+    frame, flap, wide, _ = solids_of(coupon_meshes(bodies))
+    assert frame.min_gap(flap, 1.0) == pytest.approx(0.4, abs=0.005)
+    assert frame.min_gap(wide, 1.0) == pytest.approx(0.7, abs=0.005)
+
+
+def test_a_second_coupon_goes_in_finer_steps():
+    assert fine_clearances(0.3) == (0.225, 0.25, 0.275, 0.3, 0.325, 0.35, 0.375)
+    assert [body.name for body in plan_coupon(fine_clearances(0.3))][1:4] == [
+        "flap 0.225",
+        "flap 0.25",
+        "flap 0.275",
+    ]
+
+
+@pytest.mark.parametrize("suffix", ["stl"])
+def test_no_triangle_is_without_area(tmp_path, suffix):
+    write_coupon(tmp_path / f"coupon.{suffix}", guide=False)
+    data = np.fromfile(
+        tmp_path / "coupon.stl",
+        dtype=[("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")],
+        offset=84,
+    )
+    corners = data["c"].astype(float)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert 0.5 * np.linalg.norm(cross, axis=1).min() > 1e-6
 
 
 def test_it_prints_without_support(solids):
@@ -69,7 +143,7 @@ def test_it_prints_without_support(solids):
 def test_the_exact_coupon_agrees(solids):
     coupon = Coupon(FEW)
     assert coupon.names[0] == "frame"
-    assert len(coupon.solids()) == len(coupon.names) == 7
+    assert len(coupon.solids()) == len(coupon.names) == 4
     assert all(solid.is_valid for solid in coupon.solids())
     volumes = [solid.volume for solid in coupon.solids()]
     meshes = [
@@ -108,9 +182,9 @@ def test_step_holds_every_body_by_name(tmp_path):
     written = write_coupon(tmp_path / "coupon.step", (0.3,), guide=False)
     assert written == [tmp_path / "coupon.step"]
     read = import_step(written[0])
-    assert len(read.solids()) == 4
+    assert len(read.solids()) == 3
     text = written[0].read_text("utf-8")
-    for name in ("frame", "single 0.30", "link 0.30", "double 0.30"):
+    for name in ("frame", "flap 0.3", "plug"):
         assert f"'{name}'" in text
 
 
@@ -121,8 +195,8 @@ def test_refusals(tmp_path):
         Coupon(())
     with pytest.raises(HingeError, match="only once"):
         Coupon((0.3, 0.3))
-    with pytest.raises(FitError, match=r"coupon hinge at 1\.5 mm"):
-        plan_coupon((0.3, 1.5), 20.0, 0.8)
+    with pytest.raises(FitError, match=r"coupon hinge at 4\.5 mm"):
+        plan_coupon((0.3, 4.5))
     with pytest.raises(HingeError, match="cannot raise"):
         raised_number("0.3a", 0, 0, 0)
 
