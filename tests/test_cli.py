@@ -66,7 +66,11 @@ def test_every_stage_is_a_command(fabfold):
         (["export", "sample:unicorn"], ["unicorn", "car"]),
         (["export", "sample:car", "--template", "pyramid"], ["pyramid", "box-AxBxC"]),
         (["export", "sample:car", "--voxel-mm", "-3"], ["voxel_mm"]),
-        (["export", "sample:car", "--rotation", "1,2"], ["--rotation", "three numbers"]),
+        (["export", "sample:car", "--rotation", "1,2"], ["rotation", "three numbers"]),
+        (
+            ["export", "sample:car", "-t", "nope", "--voxel-mm=-1", "--origin", "x"],
+            ["nope", "voxel_mm", "origin", "three numbers"],
+        ),
         (["export", "sample:car", "--effort", "heroic"], ["effort", "thorough"]),
         (["export", "sample:car", "--profile", "clay"], ["clay"]),
         (["export", "."], ["kit.toml"]),

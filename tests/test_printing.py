@@ -69,7 +69,7 @@ def test_own_file_is_a_profile(tmp_path):
         (MINE.replace("= 0.3", "= 0.5"), "must be below clearance_mm"),
         (MINE.replace('"FDM"', "3"), "process"),
         ("name = ", "cannot be read"),
-        ("", "name: Field required"),
+        ("", "name is missing"),
     ],
 )
 def test_wrong_profile_file_says_what_is_wrong(tmp_path, text, wanted):

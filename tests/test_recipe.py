@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from fabfold.errors import RecipeError, TemplateError
+from fabfold.errors import RecipeError
 from fabfold.recipe.recipe import Recipe, make_recipe, read_recipe
 
 
@@ -32,7 +32,7 @@ def test_every_option_is_written_with_what_it_means():
         ({"voxel_mm": float("nan")}, "voxel_mm"),
         ({"effort": "extreme"}, "effort"),
         ({"seed": 1.5}, "seed"),
-        ({"colour": "red"}, "colour: no such option"),
+        ({"colour": "red"}, "colour is no option"),
         ({"rotation": (1, 2)}, "rotation"),
         ({"drop_below": 0.9}, "drop_below"),
     ],
@@ -43,7 +43,7 @@ def test_a_wrong_value_is_named(values, word):
 
 
 def test_an_unknown_template_is_refused_with_the_recipe():
-    with pytest.raises(TemplateError, match="pyramid"):
+    with pytest.raises(RecipeError, match="template = 'pyramid': use box-AxBxC"):
         make_recipe(model="a.stl", template="pyramid")
 
 
@@ -68,3 +68,41 @@ def test_a_broken_recipe_file_is_named(tmp_path, text):
 def test_a_missing_recipe_file_is_named(tmp_path):
     with pytest.raises(RecipeError, match=r"gone\.toml"):
         read_recipe(tmp_path / "gone.toml")
+
+
+RECIPE = 'format = "fabfold-kit"\nversion = 1\n[recipe]\nmodel = "m.stl"\ntemplate = "box-1x1x2"\n'
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le"])
+def test_recipes_are_read_however_an_editor_saved_them(tmp_path, encoding):
+    mark = "\ufeff" if encoding == "utf-16-le" else ""
+    path = tmp_path / "kit.toml"
+    path.write_bytes((mark + RECIPE.replace("\n", "\r\n")).encode(encoding))
+    assert read_recipe(path).model == "m.stl"
+
+
+def test_every_fault_of_a_recipe_is_told_with_its_line(tmp_path):
+    path = tmp_path / "kit.toml"
+    more = 'voxel_mm = true\nseed = "x"\nvoxl_mm = 3\n"efort" = "quick"\nkeep = ["foo", "bar"]\n'
+    path.write_text(RECIPE + more + "pitch = 1e-300\n")
+    with pytest.raises(RecipeError) as caught:
+        read_recipe(path)
+    told = str(caught.value)
+    for words in (
+        "line 6: voxel_mm = True: must be a number or a text",
+        "line 7: seed = 'x'",
+        "line 8: voxl_mm is no option; did you mean voxel_mm?",
+        "line 9: efort is no option; did you mean effort?",
+        "line 10: keep = ['foo', 'bar']",
+        "found 'foo'; --keep: wants what to keep and where, such as front:+x, found 'bar'",
+        "line 11: pitch = 1e-300: beyond reckoning",
+    ):
+        assert words in told, told
+
+
+@pytest.mark.parametrize("given", ["s", "S", "s+d", "S+D", "ALL", "s90"])
+def test_joints_are_read_in_any_case(given):
+    recipe = make_recipe(model="a.stl", template="box-1x1x2", joints=given)
+    assert recipe.joints in ("S", "S90", "S+D", "all")
+    with pytest.raises(RecipeError, match="'S', 'S90', 'S\\+D' or 'all'"):
+        make_recipe(model="a.stl", template="box-1x1x2", joints="hinge")

@@ -17,6 +17,7 @@ from fabfold.joinery.bodies import Joinery
 from fabfold.lattice.creases import folded_template, parts_of
 from fabfold.lattice.rotations import ROTATIONS
 from fabfold.lattice.shipped import load_template, template_names
+from fabfold.lattice.template_files import read_template
 from fabfold.recipe.targets import find_input, load_target, named_target
 from fabfold.solid.closed_solid import Solid
 from fabfold.tree.assembly import hinge_choice
@@ -296,3 +297,37 @@ def test_missing_template_files_are_named(tmp_path):
         named_target(str(tmp_path / "gone.toml"))
     with pytest.raises(ModelError, match="digest 0123"):
         find_input("gone.stl", "0123" * 16, tmp_path, "template")
+
+
+def test_blocks_are_bounded_before_they_are_filled(tmp_path):
+    blocks = "".join(
+        f"[[box]]\nfrom = [{64 * k}, 0, 0]\nto = [{64 * k + 64}, 64, 64]\n" for k in range(60)
+    )
+    path = tmp_path / "huge.toml"
+    path.write_text(blocks)
+    with pytest.raises(TemplateError, match="they span 3840 cells along an axis"):
+        read_template(path)
+    path.write_text("[[box]]\nfrom = [0, 0, 0]\nto = [64, 64, 64]\n" * 60)
+    with pytest.raises(TemplateError, match="262144 cells, 64 along an axis"):
+        read_template(path)
+    hollow = "[[box]]\nfrom = [0, 0, 0]\nto = [20, 20, 20]\n"
+    hollow += "[[remove]]\nfrom = [1, 1, 1]\nto = [19, 19, 19]\n"
+    path.write_text(hollow)
+    assert len(read_template(path)) == 20**3 - 18**3
+
+
+def test_every_wrong_key_of_a_template_is_told_with_its_line(tmp_path):
+    path = tmp_path / "wrong.toml"
+    path.write_bytes(
+        b'\xef\xbb\xbfnam = 3\njoints = "all"\n[[boxx]]\nfrom = [0, 0, 0]\nto = [1, 1, 1]\n'
+    )
+    with pytest.raises(TemplateError) as caught:
+        read_template(path)
+    told = str(caught.value)
+    for words in (
+        "line 1: nam is no key; did you mean name?",
+        "line 2: joints: wants",
+        "line 3: boxx is no key; did you mean box?",
+        "one of cells, layers or [[box]], found none",
+    ):
+        assert words in told, told

@@ -117,16 +117,6 @@ def _forget_stdout() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _triple(text: str | None, option: str) -> tuple[float, float, float] | None:
-    if text is None:
-        return None
-    try:
-        x, y, z = (float(part) for part in text.split(","))
-    except ValueError:
-        raise RecipeError(f"{option} wants three numbers such as 0,90,0, found {text!r}") from None
-    return (x, y, z)
-
-
 def _number(text: str | None) -> float | str | None:
     """A number where the text is one, else the text."""
     try:
@@ -139,8 +129,6 @@ def _kit(source: str, output: Path | None, quiet: bool, **options: Any) -> Kit:
     from fabfold.cli.console import ConsoleListener
     from fabfold.kit.kit import open_kit
 
-    for name in ("rotation", "origin"):
-        options[name] = _triple(options[name], f"--{name}")
     for name in ("keep", "protect"):
         options[name] = options[name] or None
     for name in ("prefer", "void", "thicken"):

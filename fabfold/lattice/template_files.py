@@ -17,7 +17,7 @@ all as the template lies before any fold.
 
 from __future__ import annotations
 
-import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,12 @@ from fabfold.errors import TemplateError
 from fabfold.lattice.creases import check_creases
 from fabfold.lattice.rotations import FACES, IntArray
 from fabfold.lattice.template import MAX_CELLS, MAX_SIDE, Crease, Template
+from fabfold.toml_files import TomlError, line_of, nearest, read_toml
 
 __all__ = ["pieces_of", "read_template"]
 
+#: Blocks may reach so many times farther than cells before some are taken away.
+_MOST_SPAN = 4
 _KEYS = {"name", "description", "cells", "layers", "box", "remove", "fold", "joints"}
 
 
@@ -53,34 +56,45 @@ def read_template(path: Path) -> Template:
         wrong.
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise TemplateError(f"template file {path}: cannot be read: {error}") from error
+        data, text = read_toml(path)
+    except TomlError as error:
+        raise TemplateError(f"template file {path}: {error}") from None
     try:
-        template = _template(data, path.stem)
+        template = _template(data, path.stem, text)
         check_creases(template)
     except ValueError as error:
         raise TemplateError(f"template file {path}: {error}") from None
     return template
 
 
-def _template(data: dict[str, Any], stem: str) -> Template:
-    unknown = sorted(set(data) - _KEYS)
-    if unknown:
-        raise ValueError(
-            f"unknown keys: {', '.join(unknown)}; there are {', '.join(sorted(_KEYS))}"
-        )
-    name = data.get("name", stem)
+def _faults(data: dict[str, Any], given: Sequence[str], text: str) -> list[str]:
+    """What is wrong with the keys of a template, each with its line."""
+    faults = [
+        f"{line_of(text, key)}{key} is no key; {nearest(key, sorted(_KEYS))}"
+        for key in sorted(set(data) - _KEYS)
+    ]
+    name = data.get("name", "-")
     if not isinstance(name, str) or not name.strip():
-        raise ValueError("name: wants a text that is not empty")
-    given = [key for key in ("cells", "layers", "box") if key in data]
+        faults.append(f"{line_of(text, 'name')}name: wants a text that is not empty")
     if len(given) != 1:
-        raise ValueError(
+        faults.append(
             "wants a name and one of cells, layers or [[box]], "
             + (f"found {' and '.join(given)}" if given else "found none")
         )
-    if "remove" in data and given != ["box"]:
-        raise ValueError(f"remove: goes with [[box]], not with {given[0]}")
+    elif "remove" in data and given != ["box"]:
+        faults.append(f"{line_of(text, 'remove')}remove: goes with [[box]], not with {given[0]}")
+    joints = data.get("joints", "any")
+    if joints not in ("any", "inside"):
+        wants = 'wants "any" or "inside"'
+        faults.append(f"{line_of(text, 'joints')}joints: {wants}, found {joints!r}")
+    return faults
+
+
+def _template(data: dict[str, Any], stem: str, text: str) -> Template:
+    given = [key for key in ("cells", "layers", "box") if key in data]
+    if faults := _faults(data, given, text):
+        raise ValueError("; ".join(faults))
+    name, joints = data.get("name", stem), data.get("joints", "any")
     read = {"cells": _from_cells, "layers": _from_layers, "box": _from_boxes}[given[0]]
     cells = read(data)
     if len(cells) == 0:
@@ -99,9 +113,6 @@ def _template(data: dict[str, Any], stem: str) -> Template:
             f"smallest has cell {stray}"
         )
     creases = tuple(_crease(entry, k) for k, entry in enumerate(_tables(data, "fold")))
-    joints = data.get("joints", "any")
-    if joints not in ("any", "inside"):
-        raise ValueError(f'joints: wants "any" or "inside", found {joints!r}')
     return Template(name, cells, creases, joints)
 
 
@@ -165,15 +176,26 @@ def _from_layers(data: dict[str, Any]) -> IntArray:
 
 
 def _from_boxes(data: dict[str, Any]) -> IntArray:
-    kept: set[tuple[int, ...]] = set()
-    for number, entry in enumerate(_tables(data, "box")):
-        kept |= {tuple(cell) for cell in _block(entry, f"box[{number}]").tolist()}
-    for number, entry in enumerate(_tables(data, "remove")):
-        gone = {tuple(cell) for cell in _block(entry, f"remove[{number}]").tolist()}
-        if not gone & kept:
+    added = [_ends(entry, f"box[{k}]") for k, entry in enumerate(_tables(data, "box"))]
+    taken = [_ends(entry, f"remove[{k}]") for k, entry in enumerate(_tables(data, "remove"))]
+    if not added:
+        return np.zeros((0, 3), dtype=np.int32)
+    low = np.min([start for start, _ in added], axis=0)
+    size = np.max([end for _, end in added], axis=0) - low
+    if size.max() > _MOST_SPAN * MAX_SIDE:
+        raise ValueError(
+            f"box: they span {size.max()} cells along an axis; at most {MAX_SIDE} are possible"
+        )
+    grid = np.zeros(size, dtype=bool)
+    for start, end in added:
+        grid[tuple(map(slice, start - low, end - low))] = True
+    for number, (start, end) in enumerate(taken):
+        room = tuple(map(slice, np.maximum(start - low, 0), np.maximum(end - low, 0)))
+        if not grid[room].any():
             raise ValueError(f"remove[{number}]: there is no cell in it")
-        kept -= gone
-    return np.array(sorted(kept), dtype=np.int32).reshape(-1, 3)
+        grid[room] = False
+    cells: IntArray = (np.argwhere(grid) + low).astype(np.int32)
+    return cells
 
 
 def _crease(entry: dict[str, Any], number: int) -> Crease:
@@ -203,7 +225,8 @@ def _tables(data: dict[str, Any], key: str) -> list[dict[str, Any]]:
     return tables
 
 
-def _block(entry: Any, where: str) -> IntArray:
+def _ends(entry: Any, where: str) -> tuple[IntArray, IntArray]:
+    """Lowest and highest corner of a block."""
     if not isinstance(entry, dict) or set(entry) != {"from", "to"}:
         raise ValueError(f"{where}: wants from = [x, y, z] and to = [x, y, z], found {entry!r}")
     low, high = _corner(entry, where, "from"), _corner(entry, where, "to")
@@ -212,7 +235,13 @@ def _block(entry: Any, where: str) -> IntArray:
         raise ValueError(f"{where}: to must be greater than from on every axis: {low} to {high}")
     if size.max() > MAX_SIDE:
         raise ValueError(f"{where}: {size.max()} cells along an axis, at most {MAX_SIDE}")
-    return (np.argwhere(np.ones(size, dtype=bool)) + low).astype(np.int32)
+    return np.array(low), np.array(high)
+
+
+def _block(entry: Any, where: str) -> IntArray:
+    """Cells of a block."""
+    low, high = _ends(entry, where)
+    return (np.argwhere(np.ones(high - low, dtype=bool)) + low).astype(np.int32)
 
 
 def _corner(entry: dict[str, Any], where: str, key: str) -> tuple[int, int, int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from fabfold.errors import RecipeError
 from fabfold.files import data_folder
+from fabfold.toml_files import TomlError, faults_of, nearest, read_toml
 
 __all__ = [
     "DEFAULT_PROFILE",
@@ -173,18 +173,15 @@ def load_profile(name: str) -> Profile:
         path = Path(name)
         if path.suffix != ".toml" or not path.is_file():
             raise RecipeError(
-                f"no print profile {name!r}: use one of {', '.join(known)}, "
-                "or the path of a .toml file with the same fields"
+                f"no print profile {name!r}: {nearest(name, known)}; or give the path of a .toml "
+                "file with the same fields"
             )
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise RecipeError(f"print profile {path}: cannot be read: {error}") from error
+        data, text = read_toml(path)
+    except TomlError as error:
+        raise RecipeError(f"print profile {path}: {error}") from None
     try:
         return Profile.model_validate(data)
     except ValidationError as error:
-        faults = "; ".join(
-            f"{'.'.join(map(str, fault['loc'])) or 'profile'}: {fault['msg']}"
-            for fault in error.errors()
-        )
-        raise RecipeError(f"print profile {path}: {faults}") from error
+        fields = (*Profile.model_fields, *ApartFit.model_fields)
+        raise RecipeError(f"print profile {path}: {faults_of(error, fields, text)}") from None

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import tomlkit
 from pydantic import (
@@ -19,6 +18,7 @@ from pydantic import (
 from fabfold.errors import FabfoldError, RecipeError
 from fabfold.lattice.shipped import load_template
 from fabfold.recipe.targets import is_file_name
+from fabfold.toml_files import TomlError, faults_of, read_toml
 from fabfold.tree.catalogue import JointSet
 from fabfold.version import __version__
 
@@ -94,7 +94,8 @@ class Recipe(BaseModel):
         Vector | None, Field(description="grid placement by hand: lattice origin in model units")
     ] = None
     pitch: Annotated[
-        float | None, Field(gt=0, description="grid placement by hand: voxel side in model units")
+        float | None,
+        Field(gt=0, description="grid placement by hand: voxel side in model units"),
     ] = None
     surface_weight: Annotated[float, Field(ge=0, le=100, description="weight of Eq. 8")] = 0.3
     single_weight: Annotated[float, Field(ge=0, le=100, description="weight of a single hinge")] = (
@@ -135,6 +136,37 @@ class Recipe(BaseModel):
         int, Field(ge=0, le=1000, description="solution of the Pareto list; 0 is the best tree")
     ] = 0
 
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_truth_for_a_number(cls, value: Any, info: ValidationInfo) -> Any:
+        if isinstance(value, bool) and info.field_name not in ("joints_inside", "share"):
+            raise ValueError("must be a number or a text, not true or false")
+        return value
+
+    @field_validator("rotation", "origin", mode="before")
+    @classmethod
+    def _three_numbers(cls, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            x, y, z = (float(part) for part in value.split(","))
+        except ValueError:
+            raise ValueError("wants three numbers such as 0,90,0") from None
+        return (x, y, z)
+
+    @field_validator("pitch")
+    @classmethod
+    def _within_reckoning(cls, value: float | None) -> float | None:
+        if value is not None and not 1e-60 <= value <= 1e60:
+            raise ValueError("beyond reckoning; give 1e-60 to 1e60")
+        return value
+
+    @field_validator("joints", mode="before")
+    @classmethod
+    def _joints_in_any_case(cls, value: Any) -> Any:
+        known = {name.lower(): name for name in get_args(JointSet)}
+        return known.get(value.lower(), value) if isinstance(value, str) else value
+
     @field_validator("prefer", mode="before")
     @classmethod
     def _named_preference(cls, value: Any) -> Any:
@@ -151,11 +183,17 @@ class Recipe(BaseModel):
         from fabfold.solid.regions import parse_keep, parse_region
 
         texts = tuple(text for text in value if text != "none")
+        faults = []
         for text in texts:
-            if info.field_name == "keep":
-                parse_keep(text, "--keep")
-            else:
-                parse_region(text, "--protect")
+            try:
+                if info.field_name == "keep":
+                    parse_keep(text, "--keep")
+                else:
+                    parse_region(text, "--protect")
+            except FabfoldError as error:
+                faults.append(str(error))
+        if faults:
+            raise ValueError("; ".join(faults))
         return texts
 
     @field_validator("template")
@@ -163,7 +201,10 @@ class Recipe(BaseModel):
     def _known_template(cls, value: str) -> str:
         # A file is read by the kit, which knows where it is kept.
         if not is_file_name(value):
-            load_template(value)
+            try:
+                load_template(value)
+            except FabfoldError as error:
+                raise ValueError(str(error).removeprefix(f"no template {value!r}: ")) from None
         return value
 
     @field_validator("thicken", mode="before")
@@ -224,7 +265,7 @@ def make_recipe(**values: Any) -> Recipe:
     try:
         return Recipe(**{key: value for key, value in values.items() if value is not None})
     except ValidationError as error:
-        raise RecipeError(_plainly(error)) from None
+        raise RecipeError(faults_of(error, Recipe.model_fields)) from None
 
 
 def read_recipe(path: Path) -> Recipe:
@@ -236,9 +277,9 @@ def read_recipe(path: Path) -> Recipe:
         If the file is not a recipe, or a value is wrong.
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise RecipeError(f"{path}: cannot be read as a recipe: {error}") from None
+        data, text = read_toml(path)
+    except TomlError as error:
+        raise RecipeError(f"{path}: {error}; it is no recipe") from None
     if data.get("format") != "fabfold-kit" or data.get("version") != 1:
         raise RecipeError(
             f'{path}: wants format = "fabfold-kit" and version = 1, '
@@ -248,18 +289,6 @@ def read_recipe(path: Path) -> Recipe:
     if not isinstance(table, dict):
         raise RecipeError(f"{path}: has no [recipe] table")
     try:
-        return make_recipe(**table)
-    except FabfoldError as error:
-        raise RecipeError(f"{path}: {error}") from None
-
-
-def _plainly(error: ValidationError) -> str:
-    parts = []
-    for problem in error.errors():
-        where = ".".join(str(part) for part in problem["loc"]) or "recipe"
-        if problem["type"] == "extra_forbidden":
-            known = ", ".join(Recipe.model_fields)
-            parts.append(f"{where}: no such option; there are {known}")
-        else:
-            parts.append(f"{where} = {problem['input']!r}: {problem['msg'].lower()}")
-    return "; ".join(parts)
+        return Recipe(**table)
+    except ValidationError as error:
+        raise RecipeError(f"{path}: {faults_of(error, Recipe.model_fields, text)}") from None

@@ -22,6 +22,9 @@ from fabfold.solid.tessellate import tessellate
 
 __all__ = ["read_step"]
 
+#: Seconds that the kernel has to read a file and cut it into triangles.
+_PATIENCE = 600.0
+
 
 def read_step(path: Path) -> RawMesh:
     """Read all solids of a STEP file and cut their surfaces into triangles.
@@ -44,17 +47,26 @@ def read_step(path: Path) -> RawMesh:
     _check(path)
     with tempfile.TemporaryDirectory(prefix="fabfold-") as folder:
         result = Path(folder) / "mesh.npz"
-        command, environment = module_call(
-            "fabfold.solid.read_step", str(path.resolve()), str(result)
-        )
-        done = subprocess.run(
-            command,
-            env=environment,
-            capture_output=True,
-            encoding="utf-8",
-            errors="replace",
-            check=False,
-        )
+        plain = path.resolve()
+        if head_of(path, 3) == b"\xef\xbb\xbf":  # The kernel stumbles over a byte-order mark.
+            plain = Path(folder) / "model.step"
+            plain.write_bytes(path.read_bytes()[3:])
+        command, environment = module_call("fabfold.solid.read_step", str(plain), str(result))
+        try:
+            done = subprocess.run(
+                command,
+                env=environment,
+                capture_output=True,
+                encoding="utf-8",
+                errors="replace",
+                check=False,
+                timeout=_PATIENCE,
+            )
+        except subprocess.TimeoutExpired:
+            raise ModelError(
+                f"{path.name} takes the CAD kernel more than {_PATIENCE / 60:g} minutes: export a "
+                "simpler solid, or a mesh"
+            ) from None
         if done.returncode < 0 or not result.is_file():
             lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
             why = "the CAD kernel breaks down on it" if done.returncode < 0 else lines[-1:]
@@ -81,7 +93,8 @@ def _check(path: Path) -> None:
             f"{path.name} is not a STEP file but {what_is_it(head)}; export the model as STEP"
         )
     with path.open("rb") as stream:
-        stream.seek(max(0, path.stat().st_size - 256))
+        # Blank lines, comments and signatures may follow the end.
+        stream.seek(max(0, path.stat().st_size - (1 << 16)))
         tail = stream.read()
         if b"END-ISO-10303-21" not in tail:
             raise ModelError(
