@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "data_folder",
+    "json_text",
     "replacing",
     "sha256_of",
     "write_bytes",
@@ -64,9 +65,14 @@ def write_text(path: Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
+def json_text(data: Any) -> str:
+    """The JSON that is written of `data`: indented, with a line end."""
+    return json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+
+
 def write_json(path: Path, data: Any) -> None:
     """Write `data` as indented UTF-8 JSON to `path` in one step."""
-    write_text(path, json.dumps(data, indent=1, ensure_ascii=False) + "\n")
+    write_text(path, json_text(data))
 
 
 def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:

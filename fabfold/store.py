@@ -53,6 +53,7 @@ class StageStore:
         self.damage = ""
         self._journal: dict[str, dict[str, Any]] = {}
         self._names: list[str] = []
+        self._delivered: dict[str, str] = {}
         self._lock: int | None = None
         self._users = 0
         if self.folder is not None:
@@ -84,9 +85,11 @@ class StageStore:
                 self._journal[stage] = entry
         if not isinstance(stages, dict) or len(self._journal) < len(stages):
             self.damage = f"{path} was damaged in places: what those kept is made again"
-        names = data.get("names", [])
+        names, digests = data.get("names", []), data.get("delivered", {})
         if isinstance(names, list):
             self._names = [name for name in names if isinstance(name, str)]
+        if isinstance(digests, dict) and all(isinstance(one, str) for one in digests.values()):
+            self._delivered = digests
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -196,12 +199,25 @@ class StageStore:
             self._names = wanted
             self._write()
 
+    @property
+    def delivered(self) -> dict[str, str]:
+        """Digests of files of the exported kit, by name; empty before an export."""
+        return dict(self._delivered)
+
+    def record_delivered(self, digests: dict[str, str]) -> None:
+        """Note the digests of files of the exported kit."""
+        if self.folder is not None:
+            self._delivered = dict(digests)
+            self._write()
+
     def _write(self) -> None:
         assert self.folder is not None
         stages = {name: self._journal[name] for name in sorted(self._journal)}
         content: dict[str, Any] = {"format": _FORMAT, "version": 1, "stages": stages}
         if self._names:
             content["names"] = self._names
+        if self._delivered:
+            content["delivered"] = self._delivered
         write_json(self.folder / "journal.json", content)
 
 

@@ -59,6 +59,7 @@ from fabfold.version import __version__
 
 if TYPE_CHECKING:
     from fabfold.kit.kit import Kit
+    from fabfold.printing.checks import Check
 
 __all__ = ["app", "main"]
 
@@ -201,15 +202,23 @@ def _stage(name: str, summary: str) -> None:
         kit.run(name)
         from fabfold.cli.console import show_checks, show_result
 
+        checks = _checks(kit, name)
         if as_json:
-            show_checks(kit.check(), {"kit": kit.recipe.name}, as_json=True)
+            show_checks(checks, {"kit": kit.recipe.name}, as_json=True)
         else:
-            show_result(kit, name)
-        if name in ("check", "export") and not all(check.ok for check in kit.check()):
+            show_result(kit, name, checks)
+        if not all(check.ok for check in checks):
             raise typer.Exit(CheckError.exit_code)
 
     command.__name__ = name
     app.command(name, help=summary)(_guarded(command))
+
+
+def _checks(kit: Kit, stage: str) -> list[Check]:
+    """Checks that a stage shows: those of the kit, and whether its files are what was proven."""
+    if stage not in ("check", "export"):
+        return []
+    return [*kit.check(), *(kit.delivered() if stage == "check" else [])]
 
 
 def _is_model_file(source: str) -> bool:

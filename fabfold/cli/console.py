@@ -119,10 +119,10 @@ class _LastMessage:
             self.message = message
 
 
-def show_result(kit: Kit, stage: str) -> None:
-    """Print what `stage` found, and where its files are."""
+def show_result(kit: Kit, stage: str, checks: Sequence[Check] = ()) -> None:
+    """Print what `stage` found, with its checks, and where its files are."""
     console = Console(highlight=False, soft_wrap=True)
-    for line in _result_lines(kit, stage):
+    for line in _result_lines(kit, stage, checks):
         console.print(line, markup=False)
     # Not part of the kit, whose files are the same on every machine.
     spent = {
@@ -140,7 +140,7 @@ def show_result(kit: Kit, stage: str) -> None:
         console.print(f"processor seconds: {each}; {processor_seconds():.1f} with the start")
 
 
-def _result_lines(kit: Kit, stage: str) -> list[str]:
+def _result_lines(kit: Kit, stage: str, checks: Sequence[Check]) -> list[str]:
     notes = [*([kit.damage] if kit.damage else []), *kit.cut_solid().notes]
     lines = [f"note: {note}" for note in notes]
     if stage == "voxelize":
@@ -173,8 +173,7 @@ def _result_lines(kit: Kit, stage: str) -> list[str]:
     lines += [str(entry["text"]) for entry in kit.wish_report(planned, joinery)]
     if motion.certificate:
         lines.append(f"smallest gap on the whole path {motion.certificate['min_gap_mm']:.3f} mm")
-    if stage in ("check", "export"):
-        checks = kit.check()
+    if checks:
         bad = [check for check in checks if not check.ok]
         lines += [
             f"FAILED {check.name}: {check.figure:g} {check.unit} "

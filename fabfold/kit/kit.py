@@ -131,11 +131,6 @@ class Kit(StageRunner):
         )
 
     @property
-    def damage(self) -> str:
-        """What of the kit folder could not be read and is made again; empty where all could."""
-        return self._store.damage
-
-    @property
     def template(self) -> Template:
         """The target shape, as it is filled (before any folds of its own)."""
         return self._template
@@ -278,30 +273,28 @@ class Kit(StageRunner):
         return target
 
     def _export(self, target: Path, store: StageStore, *, own: bool) -> None:
+        from fabfold.kit.delivered import recorded_export
         from fabfold.kit.early import EarlyKit
         from fabfold.kit.step_process import StepProcess
-        from fabfold.kit.writing import remove_named, write_kit
+        from fabfold.kit.writing import write_kit
 
         mode = self.print_mode()
         self.cut_solid()  # Before anything in the folder changes.
         store.take()
-        earlier = set(store.names) - {self.recipe.name}
-        store.record_names([*earlier, self.recipe.name])
-        if own and not self.recipe.pick:
-            with EarlyKit(target, self.recipe, mode, self.listener) as self._early:
-                self.fold()
-        built = self.join()
-        path, tree = target / f"{self.recipe.name}.step", built.planned.tree
-        with StepProcess(path, built.joinery, tree, beside=self.workers != 1) as step:
-            checks = self.check()
-            with self._open_progress("export") as progress:
-                write_kit(
-                    target, self.recipe, mode, self.cut_solid(), built, checks, progress,
-                    step.wait, self.wish_report(built.planned, built.joinery), self._template,
-                    self.box_closure(built.planned),
-                )  # fmt: skip
-        remove_named(target, earlier)
-        store.record_names([self.recipe.name])
+        with recorded_export(store, target, self.recipe.name):
+            if own and not self.recipe.pick:
+                with EarlyKit(target, self.recipe, mode, self.listener) as self._early:
+                    self.fold()
+            built = self.join()
+            path, tree = target / f"{self.recipe.name}.step", built.planned.tree
+            with StepProcess(path, built.joinery, tree, beside=self.workers != 1) as step:
+                checks = self.check()
+                with self._open_progress("export") as progress:
+                    write_kit(
+                        target, self.recipe, mode, self.cut_solid(), built, checks, progress,
+                        step.wait, self.wish_report(built.planned, built.joinery), self._template,
+                        self.box_closure(built.planned),
+                    )  # fmt: skip
         if not own:
             self._keep_inputs(store)
 
@@ -316,7 +309,16 @@ class Kit(StageRunner):
         from fabfold.kit.writing import write_stage
 
         with self._store.locked():
-            write_stage(self, stage, getattr(self, stage)())
+            result = getattr(self, stage)()
+            # The files of an exported kit stay as they are: they are what is checked.
+            if stage != "check" or not self.delivered():
+                write_stage(self, stage, result)
+
+    def delivered(self) -> list[Check]:
+        """Check of the files of an exported kit against what was built; none before an export."""
+        from fabfold.kit.delivered import delivered_checks
+
+        return delivered_checks(self._store, self.recipe, self.join)
 
     # How the stages hang together ---------------------------------------------------------------
 

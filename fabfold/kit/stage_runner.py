@@ -38,6 +38,11 @@ class StageRunner:
         self._results: dict[str, Any] = {}
         self._unsaved: list[Callable[[], None]] = []
 
+    @property
+    def damage(self) -> str:
+        """What of the kit folder could not be read and is made again; empty where all could."""
+        return self._store.damage
+
     def _accept(self) -> None:
         """Change the kit folder for what was made; called once its input is known to be good."""
         while self._unsaved:
