@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["module_call", "safe_path"]
+__all__ = ["end_with_parent", "module_call", "safe_path"]
+
+#: Environment variable with the number of the process that called.
+_PARENT = "FABFOLD_PARENT"
+#: PR_SET_PDEATHSIG of prctl.
+_DEATH_SIGNAL = 1
 
 
 def module_call(module: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
@@ -37,7 +44,22 @@ def module_call(module: str, *arguments: str) -> tuple[list[str], dict[str, str]
     if root not in places:  # Found through the working folder, by an empty entry.
         places.append(root)
     path = os.pathsep.join(places)
-    return [sys.executable, "-P", "-m", module, *arguments], {**os.environ, "PYTHONPATH": path}
+    environment = {**os.environ, "PYTHONPATH": path, _PARENT: str(os.getpid())}
+    return [sys.executable, "-P", "-m", module, *arguments], environment
+
+
+def end_with_parent() -> None:
+    """Let this process end as soon as the one that called it does, however that ends.
+
+    Otherwise what a killed run has left would still write into its kit while the next run does.
+    Only Linux can do so.
+    """
+    if sys.platform != "linux":
+        return
+    ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+    parent = os.environ.get(_PARENT, "")
+    if parent and parent != str(os.getppid()):
+        os._exit(1)  # It ended before the system was told.
 
 
 @contextmanager

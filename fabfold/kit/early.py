@@ -9,7 +9,7 @@ import sys
 import threading
 from pathlib import Path
 
-from fabfold.child_process import module_call
+from fabfold.child_process import end_with_parent, module_call
 from fabfold.fold.motion import motion_of
 from fabfold.kit.stages import PlannedTree, build
 from fabfold.printing.print_mode import PrintMode
@@ -104,5 +104,6 @@ def write_early(work: bytes) -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     write_early(sys.stdin.buffer.read())

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
 
-from fabfold.child_process import module_call
+from fabfold.child_process import end_with_parent, module_call
 from fabfold.errors import GeometryError
 from fabfold.export.colours import body_colours
 from fabfold.export.step import write_step
@@ -108,6 +108,7 @@ def _write(path: Path, joinery: Joinery, tree: FoldTree) -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     # Asked to end, it takes its temporary file along.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     _write(*pickle.loads(sys.stdin.buffer.read()))

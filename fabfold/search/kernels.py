@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fabfold.child_process import module_call
+from fabfold.child_process import end_with_parent, module_call
 from fabfold.progress import Progress
 
 __all__ = ["HALVES", "KernelCompiler", "compile_half", "kernel_stamp"]
@@ -198,4 +198,5 @@ def _search_without_folding() -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     compile_half(sys.argv[1])

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.child_process import module_call
+from fabfold.child_process import end_with_parent, module_call
 from fabfold.errors import ModelError
 from fabfold.solid.raw import RawMesh, head_of, what_is_it
 from fabfold.solid.tessellate import tessellate
@@ -145,4 +145,5 @@ def _main(source: str, target: str) -> int:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     sys.exit(_main(sys.argv[1], sys.argv[2]))
