@@ -48,17 +48,22 @@ def module_call(module: str, *arguments: str) -> tuple[list[str], dict[str, str]
     return [sys.executable, "-P", "-m", module, *arguments], environment
 
 
-def end_with_parent() -> None:
+def end_with_parent(parent: int | None = None) -> None:
     """Let this process end as soon as the one that called it does, however that ends.
 
     Otherwise what a killed run has left would still write into its kit while the next run does.
     Only Linux can do so.
+
+    Parameters
+    ----------
+    parent : int, optional
+        Number of the process that called; by default what :func:`module_call` has noted.
     """
     if sys.platform != "linux":
         return
     ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
-    parent = os.environ.get(_PARENT, "")
-    if parent and parent != str(os.getppid()):
+    known = os.environ.get(_PARENT, "") if parent is None else str(parent)
+    if known and known != str(os.getppid()):
         os._exit(1)  # It ended before the system was told.
 
 

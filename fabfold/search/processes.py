@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
-from fabfold.child_process import safe_path
+from fabfold.child_process import end_with_parent, safe_path
 from fabfold.search.seeds import Better, Done, Event, Job, Lost, run_seed
 from fabfold.tree.candidate import Candidate
 
@@ -195,6 +195,8 @@ def _serve(connection: Connection) -> None:
     """Run seeds as they come, until the parent closes the pipe or is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    caller = multiprocessing.parent_process()
+    end_with_parent(None if caller is None else caller.pid)
 
     def stop() -> bool:
         if not connection.poll():

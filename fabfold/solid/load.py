@@ -31,6 +31,8 @@ __all__ = ["FORMATS", "load_solid", "read_mesh", "solid_from_mesh"]
 FORMATS = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".step", ".stp")
 #: Smallest thickness of the whole model as a share of its longest side.
 MIN_THICKNESS = 0.01
+#: The largest file that is read, bytes, and the most triangles.
+MAX_FILE_BYTES, MAX_TRIANGLES_READ = 2_000_000_000, 6_000_000
 #: A 32-bit file must resolve the model at least this finely.
 MIN_STEPS = 1_000
 
@@ -101,6 +103,17 @@ def read_mesh(path: Path, wanted: str = "") -> RawMesh:
         raise ModelError(f"{path.name} cannot be read: {error.strerror or error}") from error
     except MemoryError as error:
         raise ModelError(f"{path.name} is too large for this computer's memory") from error
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        # What a reader should have named; nobody who gave a damaged file is helped by a traceback.
+        raise ModelError(
+            f"{path.name} is damaged in a way that cannot be told ({type(error).__name__}: "
+            f"{' '.join(str(error).split())[:80]}); export it again"
+        ) from error
+    if len(raw.faces) > MAX_TRIANGLES_READ:
+        raise ModelError(
+            f"{path.name} has {len(raw.faces):,} triangles, and {MAX_TRIANGLES_READ:,} are the "
+            "most; export a coarser model"
+        )
     _check_numbers(path.name, raw)
     return raw
 
@@ -129,8 +142,14 @@ def _reader(path: Path) -> Callable[[Path], RawMesh]:
             f"{path.name}: files ending in {path.suffix or 'nothing'} cannot be read; "
             f"export the model as one of {known}"
         )
-    if path.stat().st_size == 0:
+    size = path.stat().st_size
+    if size == 0:
         raise ModelError(f"{path.name} is empty (0 bytes): export or download it again")
+    if size > MAX_FILE_BYTES:
+        raise ModelError(
+            f"{path.name} has {size / 1e9:.1f} GB, and {MAX_FILE_BYTES / 1e9:g} GB are the most "
+            "that is read; export a coarser model, or in a binary format"
+        )
     return reader
 
 

@@ -59,10 +59,16 @@ def colours_of_mesh(mesh: Any) -> NDArray[np.uint8] | None:
             visual = visual.to_color()
         except (AttributeError, IndexError, TypeError, ValueError):
             return None  # a texture that cannot be looked up is no paint
-    if visual.kind == "face" and len(visual.face_colors) == len(mesh.faces):
-        return np.asarray(visual.face_colors[:, :3], dtype=np.uint8)
-    if visual.kind == "vertex" and len(visual.vertex_colors) == len(mesh.vertices):
-        return colours_of_corners(mesh.faces, visual.vertex_colors[:, :3])
+    if visual.kind not in ("face", "vertex"):
+        return None
+    by_face = visual.kind == "face"
+    shades = np.asarray(visual.face_colors if by_face else visual.vertex_colors)
+    if shades.shape[1:] not in ((3,), (4,)):
+        return None
+    if by_face and len(shades) == len(mesh.faces):
+        return np.asarray(shades[:, :3], dtype=np.uint8)
+    if not by_face and len(shades) == len(mesh.vertices):
+        return colours_of_corners(mesh.faces, shades[:, :3])
     return None
 
 

@@ -39,16 +39,21 @@ def _header(path: Path) -> tuple[str, list[tuple[str, int, list[_Property]]], by
     body = data[data.index(b"\n", end) + 1 :]
     form = "ascii"
     elements: list[tuple[str, int, list[_Property]]] = []
-    for line in data[:end].decode("ascii", "replace").splitlines():
-        words = line.split()
-        if words[:1] == ["format"]:
-            form = words[1]
-        elif words[:1] == ["element"]:
-            elements.append((words[1], int(words[2]), []))
-        elif words[:1] == ["property"] and words[1] == "list":
-            elements[-1][2].append((words[4], _type(path, words[2]), _type(path, words[3])))
-        elif words[:1] == ["property"]:
-            elements[-1][2].append((words[2], "", _type(path, words[1])))
+    for number, line in enumerate(data[:end].decode("ascii", "replace").splitlines(), start=1):
+        match line.split():
+            case ["format", kind, *_]:
+                form = kind
+            case ["element", name, count, *_] if count.isdecimal():
+                elements.append((name, int(count), []))
+            case ["property", "list", counted, kind, name, *_] if elements:
+                elements[-1][2].append((name, _type(path, counted), _type(path, kind)))
+            case ["property", kind, name, *_] if elements and kind != "list":
+                elements[-1][2].append((name, "", _type(path, kind)))
+            case ["format" | "element" | "property", *_]:
+                raise ModelError(
+                    f"{path.name}: line {number} of its header is damaged ({line.strip()[:60]!r}); "
+                    "export it again"
+                )
     return form, elements, body
 
 
@@ -128,6 +133,9 @@ def read_ply_polygons(path: Path, single: bool) -> RawMesh:
     points = read.get("vertex", {})
     if not all(axis in points for axis in "xyz"):
         raise ModelError(f"{path.name}: its vertices have no x, y and z; export it again")
+    listed_points = [listing for name, _, listing in elements if name == "vertex"]
+    if any(counted for listing in listed_points for _, counted, _ in listing):
+        raise ModelError(f"{path.name}: a vertex has a list of numbers; export it again")
     vertices = np.stack([np.asarray(points[axis], dtype=np.float64) for axis in "xyz"], axis=1)
     faces = read.get("face", {})
     listed: Any = next((faces[name] for name in _CORNERS if name in faces), [])

@@ -198,4 +198,14 @@ def _load_with_trimesh(path: Path, kind: str) -> Any:
         ) from error
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise no_faces(path.name)
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
+        raise ModelError(
+            f"{path.name} is damaged: its points are not three numbers each; export it again"
+        )
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise ModelError(
+            f"{path.name}: a face names a vertex that is not there, the file has {len(vertices)}; "
+            "export it again"
+        )
     return mesh

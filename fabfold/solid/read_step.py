@@ -20,7 +20,7 @@ from fabfold.errors import ModelError
 from fabfold.solid.raw import RawMesh, head_of, what_is_it
 from fabfold.solid.tessellate import tessellate
 
-__all__ = ["read_step"]
+__all__ = ["check_step", "read_step"]
 
 #: Seconds that the kernel has to read a file and cut it into triangles.
 _PATIENCE = 600.0
@@ -44,7 +44,7 @@ def read_step(path: Path) -> RawMesh:
     ModelError
         If the file is cut off, cannot be read, or has no solid.
     """
-    _check(path)
+    check_step(path)
     with tempfile.TemporaryDirectory(prefix="fabfold-") as folder:
         result = Path(folder) / "mesh.npz"
         plain = path.resolve()
@@ -84,8 +84,19 @@ def read_step(path: Path) -> RawMesh:
     return RawMesh(vertices, faces, tuple(notes), unit="mm")
 
 
-def _check(path: Path) -> None:
-    """Refuse what can be told without the kernel."""
+def check_step(path: Path) -> None:
+    """Refuse what can be told without the CAD kernel.
+
+    Parameters
+    ----------
+    path : Path
+        A file called ``.step`` or ``.stp``.
+
+    Raises
+    ------
+    ModelError
+        If it does not begin or end like one, or has no face in it.
+    """
     head = head_of(path, 1 << 16)
     # Comments may stand anywhere between words, before the first too.
     if not re.match(rb"(?:\xef\xbb\xbf)?(?:\s|/\*.*?\*/)*ISO-10303-21", head, re.DOTALL):

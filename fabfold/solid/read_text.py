@@ -49,6 +49,8 @@ def read_obj(path: Path) -> RawMesh:
     material = ""
     for number, line in _logical_lines(path):
         words = line.split()
+        if not words:  # Nothing but blanks of a rarer kind.
+            continue
         if words[0] == "mtllib":
             libraries.append(line.split(None, 1)[1] if len(words) > 1 else "")
         elif words[0] == "usemtl":

@@ -81,11 +81,11 @@ def part_roles(package: Package) -> Roles:
     number, inside = 0, ""
     for tag, values in package.elements(_BAMBU):
         if tag == "object":
-            number, inside = int(values.get("id", 0)), "object"
+            number, inside = _whole(values.get("id")), "object"
         elif tag == "part":
             inside = "part"
             role = _ROLES.get(values.get("subtype", "normal_part").lower(), "solid")
-            roles.parts.setdefault(number, {})[int(values.get("id", 0))] = role
+            roles.parts.setdefault(number, {})[_whole(values.get("id"))] = role
         elif tag == "metadata" and inside == "object" and values.get("key") == "name":
             roles.names[number] = values.get("value", "")
         elif tag == "/part":
@@ -95,9 +95,9 @@ def part_roles(package: Package) -> Roles:
     first, last, role = 0, -1, "solid"
     for tag, values in package.elements(_PRUSA):
         if tag == "object":
-            number = int(values.get("id", 0))
+            number = _whole(values.get("id"))
         elif tag == "volume":
-            first, last = int(values.get("firstid", 0)), int(values.get("lastid", -1))
+            first, last = _whole(values.get("firstid")), _whole(values.get("lastid"), -1)
             role = "solid"
         elif tag == "metadata" and values.get("type") == "object":
             if values.get("key") == "name":
@@ -110,6 +110,11 @@ def part_roles(package: Package) -> Roles:
         elif tag == "/volume" and last >= first:
             roles.ranges.setdefault(number, []).append((first, last, role))
     return roles
+
+
+def _whole(text: str | None, otherwise: int = 0) -> int:
+    """A number of a slicer's settings; what is none there belongs to no part."""
+    return int(text) if text is not None and text.isdecimal() else otherwise
 
 
 def slicer_colours(package: Package) -> list[Shade]:

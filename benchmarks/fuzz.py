@@ -1,0 +1,158 @@
+"""Every reader on files that a fuzzer grows: coverage-guided by atheris, for a time.
+
+    python benchmarks/fuzz.py [SECONDS] [READER ...]
+
+A reader may raise an error of ours, with a sentence of one line, or read the file. Anything else is
+a finding: another exception, 10 s without an answer, over 2 GB of memory, the end of the process.
+Findings are written to the folder ``fuzz-findings`` and end the command with exit code 1. All
+readers share the time. Writes benchmarks/fuzz.md where it has an hour or so, that is 600 s or more.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import re
+import subprocess
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+FINDINGS = Path("fuzz-findings")
+sys.path[:0] = [str(HERE.parent / "tests"), str(HERE.parent)]
+
+
+def fuzz_one(name: str, seconds: int, corpus: Path) -> None:
+    """Fuzz one reader in this process, which libFuzzer ends."""
+    import logging
+    import warnings
+
+    import atheris
+
+    with atheris.instrument_imports(include=["fabfold", "trimesh", "tomllib"]):
+        from fuzz_readers import READERS
+
+        from fabfold.errors import FabfoldError
+        from fabfold.solid import read_binary, read_step, read_stl, read_text  # noqa: F401
+    logging.disable(logging.CRITICAL)
+    warnings.simplefilter("ignore")
+    reader = READERS[name]
+    folder = Path(tempfile.mkdtemp(dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
+    path = folder / reader.file
+    path.parent.mkdir(exist_ok=True)
+    for number, seed in enumerate(reader.seeds):
+        (corpus / f"seed-{number}").write_bytes(seed)
+    known: set[str] = set()
+
+    def run(data: bytes) -> None:
+        path.write_bytes(reader.wrap(data))
+        try:
+            with contextlib.redirect_stdout(io.StringIO()):
+                reader.read(path)
+        except FabfoldError as error:
+            text = str(error)
+            if "that cannot be told" in text:
+                cause = traceback.extract_tb(error.__cause__.__traceback__)
+                ours = [f for f in cause if "/fabfold/" in f.filename]
+                at = f"{Path(ours[-1].filename).name}:{ours[-1].lineno}"
+                finding(data, f"no reader's sentence at {at}: {text}")
+            elif "\n" in text.strip() and reader.file.startswith("x."):
+                finding(data, f"a message of several lines: {text!r}")
+        except Exception as error:
+            frames = traceback.extract_tb(error.__traceback__)
+            ours = [f for f in frames if "/fabfold/" in f.filename] or frames
+            at = f"{Path(ours[-1].filename).name}:{ours[-1].lineno}"
+            finding(data, f"{type(error).__name__} at {at}: {str(error)[:120]}")
+
+    def finding(data: bytes, what: str) -> None:
+        key = what.split(": ", maxsplit=1)[0]
+        if key in known:
+            return
+        known.add(key)
+        FINDINGS.mkdir(exist_ok=True)
+        digest = hashlib.sha256(data).hexdigest()[:12]
+        (FINDINGS / f"{digest}-{Path(reader.file).name}").write_bytes(reader.wrap(data))
+        print(f"FINDING {name}: {what} ({digest})", file=sys.stderr, flush=True)
+
+    words = corpus.parent / "words.txt"
+    words.write_text("".join(f'"{_escaped(word)}"\n' for word in (*reader.words, "0", "-1")))
+    options = [
+        f"-max_total_time={seconds}",
+        "-timeout=10",
+        "-rss_limit_mb=2048",
+        "-max_len=4096",
+        "-print_final_stats=1",
+        "-seed=1",
+        f"-artifact_prefix={FINDINGS.resolve()}/",
+        f"-dict={words}",
+        str(corpus),
+    ]
+    FINDINGS.mkdir(exist_ok=True)
+    atheris.Setup([sys.argv[0], *options], run)
+    atheris.Fuzz()
+
+
+def _escaped(word: str) -> str:
+    return word.replace("\\", "\\\\").replace('"', '\\"')
+
+
+def _number(pattern: str, text: str) -> int:
+    found = re.findall(pattern, text)
+    return int(found[-1]) if found else 0
+
+
+def main() -> int:
+    from fuzz_readers import READERS
+
+    seconds = int(sys.argv[1]) if len(sys.argv) > 1 else 1800
+    names = sys.argv[2:] or list(READERS)
+    share = max(2, seconds // len(names))
+    rows, faults = [], []
+    for name in names:
+        with tempfile.TemporaryDirectory() as folder:
+            corpus = Path(folder) / "corpus"
+            corpus.mkdir()
+            done = subprocess.run(
+                [sys.executable, __file__, "--one", name, str(share), str(corpus)],
+                capture_output=True,
+                text=True,
+                errors="replace",
+                check=False,
+            )
+        text = done.stderr
+        runs = _number(r"stat::number_of_executed_units:\s*(\d+)", text)
+        slowest = _number(r"stat::slowest_unit_time_sec:\s*(\d+)", text)
+        memory = _number(r"stat::peak_rss_mb:\s*(\d+)", text)
+        paths = _number(r"cov: (\d+)", text)
+        found = [line[8:] for line in text.splitlines() if line.startswith("FINDING ")]
+        if done.returncode:
+            found.append(f"{name}: ended with {done.returncode}: {text.strip()[-400:]}")
+        faults += found
+        rows.append(f"| {name} | {runs:,} | {paths:,} | {slowest} | {memory:,} | {len(found)} |")
+        print(rows[-1], *found, sep="\n", flush=True)
+    lines = [
+        "# Readers on files that a fuzzer grew",
+        "",
+        f"Written by `python benchmarks/fuzz.py {seconds}`: atheris (libFuzzer), {share} s a",
+        "reader, from small files of each kind. A finding is anything but a result or an error of",
+        "ours.",
+        "",
+        "| reader | files | places reached | slowest, s | memory, MB | findings |",
+        "|---|--:|--:|--:|--:|--:|",
+        *rows,
+    ]
+    if seconds >= 600 and len(names) == len(READERS):
+        (HERE / "fuzz.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    if not any(FINDINGS.glob("*")) and FINDINGS.is_dir():
+        FINDINGS.rmdir()
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--one"]:
+        fuzz_one(sys.argv[2], int(sys.argv[3]), Path(sys.argv[4]))
+    else:
+        sys.exit(main())
