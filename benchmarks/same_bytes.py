@@ -1,8 +1,8 @@
-"""One recipe, run in other circumstances: which files of the kit have other bytes?
+"""One recipe, run in other circumstances, and which files of the kit have other bytes.
 
     python benchmarks/same_bytes.py [--quick] [MODEL]
 
-Exports MODEL (``sample:car`` with ``--effort quick`` unless one is given) as it comes, and once more
+Exports MODEL (``sample:car`` unless one is given) with ``--effort quick`` as it comes, and once more
 in each circumstance, and compares the digests of all files, those of the stages too. ``--quick``
 changes everything at once that may not matter, in two runs side by side, and leaves the processor
 alone. Ends with 1 where bytes differ. Without ``--quick`` writes benchmarks/same_bytes.md.
@@ -28,7 +28,7 @@ CIRCUMSTANCES: tuple[tuple[str, dict[str, str], int, bool], ...] = (
     ("another hash seed", {"PYTHONHASHSEED": "12345"}, 2, False),
     (
         "one thread for BLAS and OpenMP",
-        {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")},
+        dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"),
         2,
         False,
     ),
@@ -67,8 +67,10 @@ def start(
     if "NUMBA_CPU_NAME" in environment:
         variables["NUMBA_CACHE_DIR"] = str(folder / "kernels")
     run = subprocess.Popen(
-        [sys.executable, "-m", "fabfold", "export", model, "-o", str(kit), "-j", str(workers)]
-        + ["--effort", "quick", "-q"],
+        [
+            *(sys.executable, "-m", "fabfold", "export", model, "-o", str(kit)),
+            *("-j", str(workers), "--effort", "quick", "-q"),
+        ],
         cwd=kit.parent if elsewhere else None,
         env=variables,
     )
