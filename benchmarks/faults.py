@@ -10,6 +10,7 @@ benchmarks/faults.md.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -66,16 +67,12 @@ def half_written(kit: Path) -> list[str]:
 
 
 def processes_of(kit: Path) -> int:
-    """Processes that still name the kit, or were called by a run that is gone."""
+    """Processes that the run of a kit has left: they have its mark in their environment."""
     found = 0
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != os.getpid():
-            try:
-                text = (entry / "cmdline").read_bytes()
-            except OSError:
-                continue
-            ours = (str(kit).encode(), b"fabfold.", b"multiprocessing")
-            found += any(mark in text for mark in ours)
+            with contextlib.suppress(OSError):
+                found += f"FAULTS={kit}\0".encode() in (entry / "environ").read_bytes()
     return found
 
 
@@ -96,7 +93,10 @@ def main() -> None:
         for trial in range(trials):
             kit = folder / f"kit-{trial}"
             run = subprocess.Popen(
-                command(model, kit), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+                command(model, kit),
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                env={**os.environ, "FAULTS": str(kit)},
             )
             time.sleep(rng.uniform(0.2, length))
             run.send_signal(signal.SIGKILL)

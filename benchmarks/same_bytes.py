@@ -2,10 +2,10 @@
 
     python benchmarks/same_bytes.py [--quick] [MODEL]
 
-Exports MODEL (``sample:car`` unless one is given) with ``--effort quick`` as it comes, and once more
-in each circumstance, and compares the digests of all files, those of the stages too. ``--quick``
-changes everything at once that may not matter, in two runs side by side, and leaves the processor
-alone. Ends with 1 where bytes differ. Without ``--quick`` writes benchmarks/same_bytes.md.
+Exports MODEL (``sample:car`` unless one is given) with ``--effort quick``, and once more in each
+circumstance, and compares the digests of all files, those of the stages too. ``--quick`` changes
+everything at once that may not matter, in two runs side by side, and leaves the processor alone.
+Ends with 1 where bytes differ. Without ``--quick`` writes benchmarks/same_bytes.md.
 """
 
 from __future__ import annotations

@@ -22,6 +22,7 @@ Every message says what is wrong, where, and what to do about it.
 from __future__ import annotations
 
 import errno
+import re
 
 __all__ = [
     "CheckError",
@@ -37,6 +38,7 @@ __all__ = [
     "RecipeError",
     "TemplateError",
     "WorkerError",
+    "harmless",
     "system_message",
 ]
 
@@ -138,3 +140,23 @@ def system_message(error: OSError) -> str:
     where = "" if name is None else f"{str(name)[:200]}: "
     remedy = _REMEDIES.get(error.errno or 0)
     return f"{where}{what}" + ("" if remedy is None else f": {remedy}")
+
+
+#: What a terminal obeys instead of showing it: control characters, and turns of direction.
+_COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+
+
+def harmless(text: str) -> str:
+    r"""A text that may hold names from somebody's file, so that a terminal only shows it.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+
+    Returns
+    -------
+    str
+        Control characters are written out, such as ``\x1b``; line ends and tabs stay.
+    """
+    return _COMMANDS.sub(lambda found: ascii(found[0])[1:-1], text)

@@ -54,7 +54,14 @@ from fabfold.cli.command_options import (
     VoxelMm,
     Workers,
 )
-from fabfold.errors import CheckError, FabfoldError, InputError, RecipeError, system_message
+from fabfold.errors import (
+    CheckError,
+    FabfoldError,
+    InputError,
+    RecipeError,
+    harmless,
+    system_message,
+)
 from fabfold.version import __version__
 
 if TYPE_CHECKING:
@@ -94,11 +101,11 @@ def _guarded(command: Callable[..., None]) -> Callable[..., None]:
             command(*args, **kwargs)
             sys.stdout.flush()  # Here, so that a full disk behind it is told like any other.
         except FabfoldError as error:
-            typer.echo(f"fabfold: {error}", err=True)
+            typer.echo(f"fabfold: {harmless(str(error))}", err=True)
             raise typer.Exit(error.exit_code) from None
         except OSError as error:
             _forget_stdout()
-            typer.echo(f"fabfold: {system_message(error)}", err=True)
+            typer.echo(f"fabfold: {harmless(system_message(error))}", err=True)
             raise typer.Exit(InputError.exit_code) from None
         except KeyboardInterrupt:
             typer.echo(

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as RichProgress
 from rich.table import Table
 
-from fabfold.errors import RecipeError
+from fabfold.errors import RecipeError, harmless
 from fabfold.progress import Progress, processor_seconds
 
 if TYPE_CHECKING:
@@ -67,7 +67,10 @@ class ConsoleListener:
             finally:  # What was reached is worth telling, also where the stage is stopped.
                 seconds = time.monotonic() - start
                 self._console.print(
-                    f"{title:32} {seconds:6.1f} s  {plain.message}", highlight=False, soft_wrap=True
+                    f"{title:32} {seconds:6.1f} s  {plain.message}",
+                    highlight=False,
+                    markup=False,
+                    soft_wrap=True,
                 )
         elif self._bars is not None:
             with _bar(self._bars, title) as bar:
@@ -102,6 +105,7 @@ class _LiveBar:
         self._task = bar.add_task("", title=title, total=None)
 
     def update(self, share: float | None, message: str = "") -> None:
+        message = harmless(message)
         if share is None:
             self._bar.update(self._task, description=message)
         else:
@@ -116,14 +120,14 @@ class _LastMessage:
 
     def update(self, share: float | None, message: str = "") -> None:
         if message:
-            self.message = message
+            self.message = harmless(message)
 
 
 def show_result(kit: Kit, stage: str, checks: Sequence[Check] = ()) -> None:
     """Print what `stage` found, with its checks, and where its files are."""
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     for line in _result_lines(kit, stage, checks):
-        console.print(line, markup=False)
+        console.print(harmless(line))
     # Not part of the kit, whose files are the same on every machine.
     spent = {
         _STAGES.get(name, name): seconds
@@ -197,11 +201,13 @@ def show_checks(checks: Sequence[Check], about: Mapping[str, str], *, as_json: b
     for check in checks:
         limit = "" if check.limit is None else f"{check.limit:.4g}"
         mark = "" if check.limit is None else "ok" if check.ok else "FAILED"
-        table.add_row(mark, check.name, f"{check.figure:.4g} {check.unit}", limit, check.note)
-    console = Console(highlight=False)
+        note = harmless(check.note)
+        table.add_row(mark, check.name, f"{check.figure:.4g} {check.unit}", limit, note)
+    console = Console(highlight=False, markup=False)
     console.print(table)
     passed = sum(check.ok for check in checks)
-    console.print(f"{', '.join(about.values())}: {passed} of {len(checks)} checks passed")
+    which = harmless(", ".join(about.values()))
+    console.print(f"{which}: {passed} of {len(checks)} checks passed")
 
 
 def show_inspection(found: Inspection, *, as_json: bool) -> None:
@@ -226,18 +232,18 @@ def show_inspection(found: Inspection, *, as_json: bool) -> None:
         lines["objects"] = ", ".join(
             f"{number}: {name}" for number, name in enumerate(found.objects, start=1)
         )
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     for name, text in lines.items():
-        console.print(f"{name:8} {text}", markup=False)
+        console.print(harmless(f"{name:8} {text}"))
     for note in found.notes:
-        console.print(f"note: {note}", markup=False)
+        console.print(harmless(f"note: {note}"))
     if found.thin_share > 0.1:
         console.print("note: thin parts are thickened where they have to be (--thicken)")
 
 
 def show_pareto(kit: Kit) -> None:
     """Print the Pareto list of a kit as a table, and where its pictures are."""
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     found = kit.pareto()
     table = Table("pick", "joints", "surface", "bodies", "moves", "preference", box=None)
     kept = any(solution.kept is not None for solution in found)
@@ -256,8 +262,8 @@ def show_pareto(kit: Kit) -> None:
         table.add_row(*row, *([f"{solution.kept:.0%}"] if solution.kept is not None else []))
     console.print(table)
     if kit.folder is not None:
-        console.print(f"pictures: {kit.folder}/pareto-1.png and so on", markup=False)
-        console.print(f"fabfold export {kit.folder} --pick 1 goes on with the first", markup=False)
+        console.print(f"pictures: {kit.folder}/pareto-1.png and so on")
+        console.print(f"fabfold export {kit.folder} --pick 1 goes on with the first")
 
 
 def show_list(what: str) -> None:
@@ -268,7 +274,7 @@ def show_list(what: str) -> None:
     RecipeError
         If `what` is none of the three.
     """
-    console = Console()
+    console = Console(markup=False)
     if what == "samples":
         from fabfold.samples.builtin import sample, sample_names
 

@@ -81,10 +81,16 @@ def _triple(values: Sequence[float]) -> str:
 
 
 def _string(text: str) -> str:
-    """A quoted string; anything but plain ASCII as ISO 10303-21 wants it."""
+    """A quoted string; anything but plain ASCII as ISO 10303-21 wants it.
+
+    A quote before a comma or bracket is written by its number: Open CASCADE takes it for the end
+    of the string even where it is doubled.
+    """
     parts = []
-    for letter in text:
-        if letter in "'\\":
+    for index, letter in enumerate(text):
+        if letter == "'" and text[index + 1 :].lstrip()[:1] in (",", ")", ""):
+            parts.append("\\X\\27")
+        elif letter in "'\\":
             parts.append(letter * 2)
         elif " " <= letter <= "~":
             parts.append(letter)

@@ -229,10 +229,10 @@ class Recipe(BaseModel):
 
     @property
     def name(self) -> str:
-        """Stem of the model's name: what the kit's files are called."""
+        """Stem of the model's name: what the kit's files are called, without line ends and such."""
         if self.model.startswith("sample:"):
             return self.model.removeprefix("sample:")
-        return Path(self.model).stem
+        return "".join(c if c.isprintable() else "_" for c in Path(self.model).stem)
 
     def to_toml(self) -> str:
         """The content of ``kit.toml``, each value with what it means."""
