@@ -101,7 +101,7 @@ def ply_file(form: str) -> bytes:
     )
 
 
-def _ply_strips() -> bytes:
+def ply_strips() -> bytes:
     return (
         b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
         b"property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n"
@@ -237,7 +237,7 @@ def _readers() -> Iterator[tuple[str, Reader]]:
         "PLY",
         Reader(
             "x.ply",
-            (*map(ply_file, ("ascii", "binary_little_endian", "binary_big_endian")), _ply_strips()),
+            (*map(ply_file, ("ascii", "binary_little_endian", "binary_big_endian")), ply_strips()),
             read_mesh,
             words=("element", "property", "list", "uchar", "double", "tristrips", "end_header"),
         ),

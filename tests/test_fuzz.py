@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from fuzz_readers import READERS, glb_file, gltf_scene, ply_file, slicer_file
+from fuzz_readers import READERS, glb_file, gltf_scene, ply_file, ply_strips, slicer_file
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -62,6 +62,14 @@ FOUND = {
     "no name of a property.ply": (ply_with("property float"), "line 5"),
     "no element.ply": (ply_file("ascii").replace(b"element vertex 4\n", b""), "line 4"),
     "list without a type.ply": (ply_with("property list uchar"), "line 5 of its header"),
+    "strip of large numbers.ply": (
+        ply_strips().replace(b"9 0 1 2 3", b"9 0 1 2 " + 80 * b"6"),
+        "a strip names a vertex",
+    ),
+    "blanks instead of a face.off": (
+        b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n\\\n\\\n\n",
+        "only 3 lines follow",
+    ),
     "list of a vertex.ply": (
         ply_with("property list uchar float x").replace(b"4 4", b"5 4"),
         "a list of numbers|cannot be read|damaged",
@@ -83,6 +91,13 @@ def test_rare_blanks_of_an_obj_are_blanks(tmp_path: Path) -> None:
     path = tmp_path / "blanks.obj"
     path.write_bytes(b"v 0 0 0\nv 1 0 0\nv 0 1 0\n\x0b\\\n\nf 1 2 3\n")
     assert read_mesh(path).faces.tolist() == [[0, 1, 2]]
+
+
+def test_a_material_that_is_no_number_is_black(tmp_path: Path) -> None:
+    (tmp_path / "x.mtl").write_text("newmtl dark\nKd nan -1e999 2\n")
+    path = tmp_path / "x.obj"
+    path.write_text("mtllib x.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl dark\nf 1 2 3\n")
+    assert read_mesh(path).colours.tolist() == [[0, 0, 255]]
 
 
 def test_settings_that_are_no_numbers_belong_to_no_part(tmp_path: Path) -> None:

@@ -156,12 +156,13 @@ def read_ply_polygons(path: Path, single: bool) -> RawMesh:
     shades = _shades(faces, len(polygons))
     owners = np.repeat(np.arange(len(polygons)), [len(polygon) - 2 for polygon in polygons])
     triangles = triangulate_polygons(vertices, polygons)
-    strip_triangles = np.array(list(_strip_triangles(listed_strips)), dtype=np.int64)
-    triangles = np.concatenate([triangles, strip_triangles.reshape(-1, 3)])
+    from_strips = list(_strip_triangles(listed_strips))
+    if from_strips and max(map(max, from_strips)) >= len(vertices):
+        raise ModelError(f"{path.name}: a strip names a vertex that is not there; export it again")
+    strip_triangles = np.array(from_strips, dtype=np.int64).reshape(-1, 3)
+    triangles = np.concatenate([triangles, strip_triangles])
     if len(triangles) == 0:
         raise no_faces(path.name)
-    if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise ModelError(f"{path.name}: a strip names a vertex that is not there; export it again")
     colours = None
     corner_shades = _shades(points, len(vertices))
     if shades is not None and len(strip_triangles) == 0:

@@ -49,8 +49,6 @@ def read_obj(path: Path) -> RawMesh:
     material = ""
     for number, line in _logical_lines(path):
         words = line.split()
-        if not words:  # Nothing but blanks of a rarer kind.
-            continue
         if words[0] == "mtllib":
             libraries.append(line.split(None, 1)[1] if len(words) > 1 else "")
         elif words[0] == "usemtl":
@@ -106,7 +104,8 @@ def _materials(path: Path, libraries: Sequence[str]) -> dict[str, tuple[int, ...
                     kd = [float(word) for word in words[1:]]
                 except ValueError:
                     continue
-                known[name] = tuple(round(255 * min(max(value, 0.0), 1.0)) for value in kd)
+                # In this order "nan", which no comparison holds for, becomes 0.
+                known[name] = tuple(round(255 * min(1.0, max(0.0, value))) for value in kd)
     return known
 
 
@@ -231,7 +230,7 @@ def _logical_lines(path: Path) -> Iterator[tuple[int, str]]:
     pending = ""
     with path.open(encoding=encoding_of(path), errors="replace") as stream:
         for number, line in enumerate(stream, start=1):
-            text = pending + line.split("#", 1)[0].strip()
+            text = (pending + line.split("#", 1)[0]).strip()
             pending = ""
             if text.endswith("\\"):
                 pending = text[:-1] + " "
