@@ -4,7 +4,8 @@
 
 Exports MODEL (``sample:car`` unless one is given) with ``--effort quick``, and once more in each
 circumstance, and compares the digests of all files, those of the stages too. ``--quick`` changes
-everything at once that may not matter, in two runs side by side, and leaves the processor alone.
+everything at once that may not matter, in two runs of a small model side by side, and leaves the
+processor alone.
 Ends with 1 where bytes differ. Without ``--quick`` writes benchmarks/same_bytes.md.
 """
 
@@ -16,6 +17,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+import trimesh
 
 HERE = Path(__file__).resolve().parent
 #: What may not matter: name, environment, workers, whether the folder is another.
@@ -58,7 +61,12 @@ PROCESSORS: tuple[tuple[str, dict[str, str], int, bool], ...] = (
 
 
 def start(
-    model: str, folder: Path, environment: dict[str, str], workers: int, elsewhere: bool
+    model: str,
+    folder: Path,
+    environment: dict[str, str],
+    workers: int,
+    elsewhere: bool,
+    more: tuple[str, ...] = (),
 ) -> tuple[Path, subprocess.Popen[bytes]]:
     """Begin an export; the kit's folder has one name, wherever it lies."""
     kit = folder / ("deeper/still" if elsewhere else "") / "kit"
@@ -69,7 +77,7 @@ def start(
     run = subprocess.Popen(
         [
             *(sys.executable, "-m", "fabfold", "export", model, "-o", str(kit)),
-            *("-j", str(workers), "--effort", "quick", "-q"),
+            *("-j", str(workers), "--effort", "quick", "-q", *more),
         ],
         cwd=kit.parent if elsewhere else None,
         env=variables,
@@ -91,14 +99,18 @@ def differing(one: dict[str, str], other: dict[str, str]) -> list[str]:
 
 def main() -> int:
     quick = "--quick" in sys.argv
-    model = next((arg for arg in sys.argv[1:] if not arg.startswith("-")), "sample:car")
+    given = [arg for arg in sys.argv[1:] if not arg.startswith("-")]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        model, more = (given[0] if given else "sample:car"), ()
+        if quick and not given:
+            model, more = str(folder / "bar.stl"), ("-t", "box-2x2x2")
+            trimesh.creation.box((80.0, 9.6, 9.6)).export(model)
         if quick:
             every = {key: value for _, more, _, _ in CIRCUMSTANCES for key, value in more.items()}
             runs = [
-                start(model, folder / "1", {}, 2, False),
-                start(model, folder / "2", every, 1, True),
+                start(model, folder / "1", {}, 2, False, more),
+                start(model, folder / "2", every, 1, True, more),
             ]
             codes = [run.wait() for _, run in runs]
             one, other = (digests(kit) for kit, _ in runs)
