@@ -33,6 +33,7 @@ def fuzz_one(name: str, seconds: int, corpus: Path) -> None:
     import atheris
 
     with atheris.instrument_imports(include=["fabfold", "trimesh", "tomllib"]):
+        import trimesh.exchange.gltf  # noqa: F401
         from fuzz_readers import READERS
 
         from fabfold.errors import FabfoldError

@@ -152,6 +152,12 @@ def nearby_rotations(
     return np.array(found).reshape(-1, 3, 3)
 
 
+#: So that halves are rounded up whatever the unit and place of the model, in subvoxels: where a
+#: plane falls may not depend on the last digit of its position.
+_TIE = 1e-6
+_HALF = 0.5 + _TIE
+
+
 @njit(cache=True)
 def _keep_largest(keep, fills, stack, labels):  # type: ignore[no-untyped-def]
     """Clear `keep` outside the face-connected group of cells with the most material."""
@@ -281,7 +287,7 @@ def _rank_translations(table, pitch, steps, energy, capacity, drop_surplus_below
     size = np.array([table.shape[0] - 1, table.shape[1] - 1, table.shape[2] - 1])
     cells = np.zeros(3, dtype=np.int64)
     for axis in range(3):
-        cells[axis] = math.ceil(size[axis] / pitch) + 1
+        cells[axis] = math.ceil(size[axis] / pitch - _TIE) + 1
     most = cells[0] * cells[1] * cells[2]
     result = np.zeros((steps**3, 4))
     keep = np.zeros((cells[0], cells[1], cells[2]), dtype=np.bool_)
@@ -294,11 +300,11 @@ def _rank_translations(table, pitch, steps, energy, capacity, drop_surplus_below
         ys = np.zeros(cells[1] + 1, dtype=np.int64)
         zs = np.zeros(cells[2] + 1, dtype=np.int64)
         for i in range(cells[0] + 1):
-            xs[i] = math.floor((i - shift[0] / steps) * pitch + 0.5)
+            xs[i] = math.floor((i - shift[0] / steps) * pitch + _HALF)
         for i in range(cells[1] + 1):
-            ys[i] = math.floor((i - shift[1] / steps) * pitch + 0.5)
+            ys[i] = math.floor((i - shift[1] / steps) * pitch + _HALF)
         for i in range(cells[2] + 1):
-            zs[i] = math.floor((i - shift[2] / steps) * pitch + 0.5)
+            zs[i] = math.floor((i - shift[2] / steps) * pitch + _HALF)
         fills = box_counts_kernel(table, xs, ys, zs) / volume
         fit = _grid_fit(fills, energy, capacity, drop_surplus_below, keep, stack, labels)
         result[row, 0] = fit[0] - excess_cost * fit[5]

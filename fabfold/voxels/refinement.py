@@ -51,6 +51,8 @@ _AGAIN = 40
 _STEPS = 4
 #: Pitches added at most because they divide a side of the model evenly.
 _MOST_FITTED = 8
+#: What rounding errors may not decide: see :mod:`fabfold.voxels.grid_placement`.
+_TIE = 1e-6
 #: Grids of a rotation whose planes are moved in the first round.
 _MOVED = 4
 
@@ -351,9 +353,9 @@ class Refinement:
         step = pitch / side
         start = -_shift(row) / _STEPS * step
         regular = [
-            np.floor(start[axis] + step * np.arange(-1, np.ceil(size / step) + 3) + 0.5).astype(
-                np.int64
-            )
+            np.floor(
+                start[axis] + step * np.arange(-1, np.ceil(size / step - _TIE) + 3) + 0.5 + _TIE
+            ).astype(np.int64)
             for axis, size in enumerate(table.shape)
         ]
         limit = int(self.limit / SUBDIVISION * step)
@@ -401,12 +403,12 @@ class Refinement:
         side = item.pitch / SUBDIVISION
         # The table begins on a plane of the grid, so that its planes are at whole subvoxels.
         corner = np.array(item.origin) - 0.5 * item.pitch
-        start = corner + np.floor((low - corner) / item.pitch - 1e-9) * item.pitch
+        start = corner + np.floor((low - corner) / item.pitch - _TIE) * item.pitch
         shape = _shape(high - start, side)
         if float(np.prod(np.array(shape, dtype=float))) > _FINE_LIMIT:
             return []
         table = summed_volume((vertices - start) / side, self.faces, shape)
-        inside = np.maximum(np.floor((low - start) / side), 0).astype(np.int64)
+        inside = np.maximum(np.floor((low - start) / side + _TIE), 0).astype(np.int64)
         window = np.ascontiguousarray(table[inside[0] :, inside[1] :, inside[2] :])
         results = []
         for units in pitches:
@@ -494,5 +496,5 @@ class Refinement:
 
 
 def _shape(extent: NDArray[np.float64], side: float) -> tuple[int, int, int]:
-    x, y, z = np.maximum(np.ceil(extent / side), 1).astype(int).tolist()
+    x, y, z = np.maximum(np.ceil(extent / side - _TIE), 1).astype(int).tolist()
     return (x, y, z)
