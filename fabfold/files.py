@@ -55,7 +55,9 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write `data` to `path` in one step."""
+    """Write `data` to `path` in one step; a file that holds it already is left as it is."""
+    if path.is_file() and path.stat().st_size == len(data) and path.read_bytes() == data:
+        return
     with replacing(path) as temporary:
         temporary.write_bytes(data)
 
