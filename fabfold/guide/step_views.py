@@ -1,0 +1,192 @@
+"""From where a step is seen best: all that moves, before and after, and the sense of its turn.
+
+After Agrawala et al. (2003), "Designing effective step-by-step assembly instructions": views are
+planned together, and the reader turns the object only where something would be hidden otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.export.camera import View, camera_for, project
+from fabfold.guide.fold_steps import FoldStep
+from fabfold.joinery.bodies import Joinery
+from fabfold.tree.fold_tree import FoldTree
+
+__all__ = ["FIRST_VIEW", "StepView", "step_views", "visible_shares"]
+
+#: Pixels of the small pictures in which it is counted what can be seen.
+_PIXELS = (112, 84)
+#: Directions that are tried: degrees about z, and above the horizon.
+_AZIMUTHS = tuple(range(-60, 300, 45))
+_HEIGHTS = (24, 48, -24)
+#: A reader turns the object where another view is this much better.
+_WORTH_TURNING = 1.5
+#: Least share of what moves that must be seen in a view that is kept.
+_LEAST_SEEN = 0.3
+#: Seen from below counts less: nobody likes to look there.
+_FROM_BELOW = 0.75
+
+
+@dataclass(frozen=True)
+class StepView:
+    """From where a step is seen.
+
+    Attributes
+    ----------
+    azimuth_deg, elevation_deg : float
+        As of :class:`fabfold.export.camera.View`.
+    turned : bool
+        Whether the object is turned for it, against the step before.
+    """
+
+    azimuth_deg: float
+    elevation_deg: float
+    turned: bool = False
+
+
+#: The view that a model is shown in, if nothing speaks against it.
+FIRST_VIEW = StepView(-60.0, 24.0)
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """The voxels of all bodies as cubes: little to draw, and nearly what is seen."""
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    body: NDArray[np.int32]
+
+    def posed(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vertices (v, 3) where the bodies are."""
+        mine = poses[self.body]
+        return np.asarray(
+            np.einsum("vij,vj->vi", mine[:, :3, :3], self.vertices) + mine[:, :3, 3]
+        )
+
+
+_CUBE = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+_CUBE_FACES = np.array(
+    [
+        *((0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)),
+        *((2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)),
+    ],
+    dtype=np.int32,
+)
+
+
+def _blocks(joinery: Joinery, tree: FoldTree) -> _Blocks:
+    """Cubes of the voxels; a body without voxels is a plate in its bounds."""
+    cubes, owners = [], []
+    origin = np.asarray(joinery.origin_mm, dtype=float)
+    for index, body in enumerate(tree.bodies):
+        for voxel in body.voxels:
+            cubes.append(origin + joinery.voxel_mm * (tree.source[voxel] + _CUBE))
+            owners.append(index)
+        if not len(body.voxels):
+            points = joinery.bodies[index].vertices
+            low, high = points.min(axis=0), points.max(axis=0)
+            cubes.append((low + high) / 2 + (high - low) * _CUBE)
+            owners.append(index)
+    faces = np.concatenate([_CUBE_FACES + 8 * number for number in range(len(cubes))])
+    body = np.repeat(np.array(owners, dtype=np.int32), 8)
+    return _Blocks(np.concatenate(cubes), faces.astype(np.int32), body)
+
+
+def visible_shares(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    moving: NDArray[np.bool_],
+    view: View,
+    within: NDArray[np.float64],
+) -> float:
+    """Which share of what moves is not hidden.
+
+    Parameters
+    ----------
+    points : (v, 3) float64 array
+        Vertices of everything.
+    faces : (f, 3) int32 array
+        Its triangles.
+    moving : (f,) bool array
+        Those of what moves.
+    view : View
+        From where.
+    within : (n, 3) float64 array
+        What the picture holds.
+
+    Returns
+    -------
+    float
+        Pixels of it that are seen, of those that it would cover alone; 0 to 1.
+    """
+    from fabfold.export.raster import fill_triangles
+
+    camera = camera_for(within, view, view.size, None)
+    screen = project(points, camera)
+    _, nearest = fill_triangles(screen, faces, *view.size)
+    _, alone = fill_triangles(screen, faces[moving], *view.size)
+    wanted = int((alone >= 0).sum())
+    seen = int((moving[nearest] & (nearest >= 0)).sum())
+    return seen / wanted if wanted else 0.0
+
+
+def _directions() -> Iterator[tuple[float, float]]:
+    for height in _HEIGHTS:
+        for azimuth in _AZIMUTHS:
+            yield float(azimuth), float(height)
+
+
+def _score(
+    blocks: _Blocks, step: FoldStep, direction: tuple[float, float]
+) -> tuple[float, float]:
+    """How well a step is seen from a direction, and how much of what moves is seen."""
+    before, after = blocks.posed(step.before), blocks.posed(step.after)
+    moving = np.isin(blocks.body, step.moving)[blocks.faces[:, 0]]
+    view = View(*direction, size=_PIXELS)
+    within = np.concatenate([before, after])
+    first = visible_shares(before, blocks.faces, moving, view, within)
+    last = visible_shares(after, blocks.faces, moving, view, within)
+    azimuth, height = np.radians(direction)
+    away = np.array(
+        [np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height), np.sin(height)]
+    )
+    # Along its axis a turn is seen as it is; square to it, as a stroke.
+    sense = 0.45 + 0.55 * abs(float(step.axis @ away))
+    score = (0.1 + 0.9 * first) * (0.4 + 0.6 * last) * sense
+    return score * (_FROM_BELOW if height < 0 else 1.0), min(first, 2 * last)
+
+
+def step_views(joinery: Joinery, tree: FoldTree, steps: Sequence[FoldStep]) -> list[StepView]:
+    """A view for each step, and one for the end.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The printed bodies in shape A.
+    tree : FoldTree
+        The bodies and hinges, in the same order.
+    steps : sequence of FoldStep
+        The steps.
+
+    Returns
+    -------
+    list of StepView
+        One more than there are steps.
+    """
+    blocks = _blocks(joinery, tree)
+    views: list[StepView] = []
+    now = (FIRST_VIEW.azimuth_deg, FIRST_VIEW.elevation_deg)
+    for step in steps:
+        found = {direction: _score(blocks, step, direction) for direction in _directions()}
+        best = max(found, key=lambda direction: found[direction][0])
+        score, seen = found[now]
+        turn = score * _WORTH_TURNING < found[best][0] or seen < _LEAST_SEEN < found[best][1]
+        now = best if turn else now
+        views.append(StepView(*now, turned=turn))
+    last = StepView(now[0], abs(now[1]), turned=now[1] < 0)
+    return [*views, last]
