@@ -59,6 +59,7 @@ def render(
     view: View | None = None,
     *,
     distance: float | None = None,
+    within: NDArray[np.float64] | None = None,
 ) -> Image:
     """Draw meshes.
 
@@ -75,6 +76,8 @@ def render(
     distance : float, optional
         Distance of the camera from the middle of the meshes, in their unit; the nearest that has
         them all by default.
+    within : (n, 3) float64 array, optional
+        Points that the picture is to hold besides the meshes.
 
     Returns
     -------
@@ -94,7 +97,8 @@ def render(
     vertices, corners, normals, owner = _gathered(meshes, transforms)
     samples = view.samples
     pixels = (view.size[0] * samples, view.size[1] * samples)
-    camera = camera_for(vertices, view, pixels, distance)
+    held = vertices if within is None else np.concatenate([vertices, within])
+    camera = camera_for(held, view, pixels, distance)
     screen = project(vertices, camera)
     near, triangle = fill_triangles(screen, corners, *pixels)
     points, facing = surface_points(triangle, screen, corners, vertices, normals)

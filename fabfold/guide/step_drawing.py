@@ -1,0 +1,273 @@
+"""The picture of a step: what moves in colour, where it goes as a pale image, and an arrow.
+
+It reads in black and white too: what moves is darker than what stays, where it ends has an outline,
+and the arrow is black with a white rim.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.export.camera import PinholeCamera, View, camera_for, project
+from fabfold.export.render import Image, Mesh, render
+from fabfold.guide.fold_steps import FoldStep, turned
+from fabfold.guide.fonts import font_file
+from fabfold.guide.step_views import StepView
+
+__all__ = ["ARROW_SHARES", "MOVING", "STAYING", "StepPicture", "arrow_points", "draw_step"]
+
+#: Colours of what moves, of what stays, and of the pale image of where it ends.
+MOVING, STAYING, GHOST = (222, 88, 28), (226, 224, 219), (246, 190, 150)
+#: Share of the pale image in its picture.
+_PALE = 0.42
+#: From where to where on the turn the arrow goes.
+ARROW_SHARES = (0.06, 0.94)
+#: The arrow's distance from the hinge, in voxel sides.
+_REACH = (0.75, 1.6)
+#: Lines and letters are drawn this many times larger, and made smaller, so that they are smooth.
+_FINER = 3
+
+
+@dataclass(frozen=True)
+class StepPicture:
+    """A step drawn, and where in the picture what is.
+
+    Attributes
+    ----------
+    image : (h, w, 3) uint8 array
+        sRGB.
+    camera : PinholeCamera
+        That it was taken with, in pixels of the image.
+    arrow : (n, 2) float64 array
+        The line of the arrow, from its tail to its head, in pixels.
+    label : four floats
+        Left, top, right and bottom of the angle that is written, in pixels.
+    """
+
+    image: Image
+    camera: PinholeCamera
+    arrow: NDArray[np.float64]
+    label: tuple[float, float, float, float]
+
+
+def arrow_points(
+    step: FoldStep, meshes: Sequence[Mesh], voxel_mm: float, count: int = 33
+) -> NDArray[np.float64]:
+    """Points of the arc on which the middle of what moves goes, mm.
+
+    Parameters
+    ----------
+    step : FoldStep
+        The step.
+    meshes : sequence of (vertices, faces)
+        Bodies in shape A, mm.
+    voxel_mm : float
+        Side of a voxel; the arc keeps about so far from the hinge.
+    count : int
+        Number of points.
+
+    Returns
+    -------
+    (count, 3) float64 array
+        From where it is to where it goes.
+    """
+    points = _points(meshes, step.before, step.moving)
+    # The part of it that is near the hinge: there the hand takes hold, and the arrow begins.
+    near = points[np.linalg.norm(points - step.point, axis=1) < 2.5 * voxel_mm]
+    middle = (near if len(near) else points).mean(axis=0)
+    along = float((middle - step.point) @ step.axis)
+    along = float(np.clip(along, -0.5 * voxel_mm, 0.5 * voxel_mm))
+    foot = step.point + along * step.axis
+    out = middle - step.point - ((middle - step.point) @ step.axis) * step.axis
+    length = float(np.linalg.norm(out))
+    if length < 1e-9:
+        out, length = np.cross(step.axis, [0.577, 0.577, 0.577]), 1.0
+    radius = float(np.clip(length, _REACH[0] * voxel_mm, _REACH[1] * voxel_mm))
+    start = foot + out / length * radius
+    shares = np.linspace(*ARROW_SHARES, count)
+    body = step.moving[0]
+    back = np.linalg.inv(step.before[body])
+    local = back[:3, :3] @ start + back[:3, 3]
+    poses = [turned(step, float(share))[body] for share in shares]
+    return np.array([pose[:3, :3] @ local + pose[:3, 3] for pose in poses])
+
+
+def _points(
+    meshes: Sequence[Mesh], poses: NDArray[np.float64], bodies: Sequence[int]
+) -> NDArray[np.float64]:
+    return np.concatenate(
+        [meshes[body][0] @ poses[body][:3, :3].T + poses[body][:3, 3] for body in bodies]
+    )
+
+
+def draw_step(
+    meshes: Sequence[Mesh],
+    step: FoldStep,
+    view: StepView,
+    voxel_mm: float,
+    size: tuple[int, int],
+) -> StepPicture:
+    """Draw a step.
+
+    Parameters
+    ----------
+    meshes : sequence of (vertices, faces)
+        Bodies in shape A, mm.
+    step : FoldStep
+        The step.
+    view : StepView
+        From where it is seen.
+    voxel_mm : float
+        Side of a voxel.
+    size : (int, int)
+        Width and height in pixels.
+
+    Returns
+    -------
+    StepPicture
+        The picture, and where its arrow and label are.
+    """
+    every = range(len(meshes))
+    arc = arrow_points(step, meshes, voxel_mm)
+    after = _points(meshes, step.after, every)
+    within = np.concatenate([after, arc])
+    look = View(
+        view.azimuth_deg, view.elevation_deg, size=size, ground=False, lights=8, margin=0.05
+    )
+    colours = np.array([MOVING if body in step.moving else STAYING for body in every], np.uint8)
+    image = render(meshes, colours, step.before, look, within=within)
+    before = _points(meshes, step.before, every)
+    camera = camera_for(np.concatenate([before, within]), look, size, None)
+    image = _with_ghost(image, meshes, step, camera)
+    arrow = project(arc, camera)[:, :2]
+    axis = step.point + np.outer([-0.9, 0.9], step.axis) * voxel_mm
+    image, label = _with_marks(image, arrow, project(axis, camera)[:, :2], f"{step.degrees:g}°")
+    return StepPicture(image, camera, arrow, label)
+
+
+def _owners(
+    meshes: Sequence[Mesh], poses: NDArray[np.float64], camera: PinholeCamera, size: tuple[int, int]
+) -> NDArray[np.int64]:
+    """Which body is seen at each pixel (h, w); -1 where there is none."""
+    from fabfold.export.raster import fill_triangles
+
+    counts = [len(faces) for _, faces in meshes]
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
+    faces = np.concatenate(
+        [faces + start for (_, faces), start in zip(meshes, starts, strict=False)]
+    ).astype(np.int32)
+    screen = project(_points(meshes, poses, range(len(meshes))), camera)
+    _, nearest = fill_triangles(screen, faces, *size)
+    owner = np.repeat(np.arange(len(meshes)), counts)
+    return np.where(nearest >= 0, owner[nearest], -1)
+
+
+def _with_ghost(
+    image: Image, meshes: Sequence[Mesh], step: FoldStep, camera: PinholeCamera
+) -> Image:
+    """A pale image of where the moving bodies end, with an outline."""
+    size = (image.shape[1], image.shape[0])
+    ends = np.isin(_owners(meshes, step.after, camera, size), step.moving)
+    here = np.isin(_owners(meshes, step.before, camera, size), step.moving)
+    ghost = ends & ~here
+    result = image.astype(np.float64)
+    result[ghost] += _PALE * (np.array(GHOST) - result[ghost])
+    inner = ends.copy()
+    for axis in (0, 1):
+        for shift in (-1, 1):
+            inner &= np.roll(ends, shift, axis=axis)
+    line = ends & ~inner & ~here
+    # Dashed, so that in black and white too it is not taken for a thing that is there.
+    rows, columns = np.indices(line.shape)
+    line &= (rows + columns) // 5 % 3 < 2
+    result[line] = np.array(MOVING) * 0.8
+    return np.asarray(np.rint(result), dtype=np.uint8)
+
+
+def _with_marks(
+    image: Image, arrow: NDArray[np.float64], axis: NDArray[np.float64], text: str
+) -> tuple[Image, tuple[float, float, float, float]]:
+    """The hinge's line, the arrow, and the angle beside it; bounds of the angle."""
+    from PIL import Image as PillowImage
+    from PIL import ImageDraw, ImageFont
+
+    height, width = image.shape[:2]
+    layer = PillowImage.new("RGBA", (width * _FINER, height * _FINER), (0, 0, 0, 0))
+    draw = ImageDraw.Draw(layer)
+    unit = _FINER * height / 420
+    _dashes(draw, axis * _FINER, unit)
+    line = arrow * _FINER
+    head = _head(line, 17 * unit)
+    body = line[: max(2, int(np.ceil(len(line) * 0.97)))]
+    for wide, colour in ((10.5, (255, 255, 255, 235)), (5.5, (20, 20, 20, 255))):
+        draw.line([tuple(p) for p in body.tolist()], fill=colour, width=round(wide * unit), joint="curve")
+        rim = (wide - 5.5) * unit / 2
+        middle = head.mean(axis=0)
+        grown = middle + (head - middle) * (1 + 2.2 * rim / (17 * unit))
+        draw.polygon([tuple(p) for p in grown.tolist()], fill=colour)
+    font = ImageFont.truetype(str(font_file(bold=True)), round(19 * unit))
+    label = _label_place(line, draw.textbbox((0, 0), text, font=font), layer.size, unit)
+    draw.rounded_rectangle(label, radius=7 * unit, fill=(255, 255, 255, 225))
+    draw.text(
+        ((label[0] + label[2]) / 2, (label[1] + label[3]) / 2), text, font=font, fill=(20, 20, 20, 255), anchor="mm"
+    )
+    small = layer.resize((width, height), PillowImage.Resampling.BOX)
+    base = PillowImage.fromarray(image).convert("RGBA")
+    base.alpha_composite(small)
+    x0, y0, x1, y1 = (value / _FINER for value in label)
+    return np.asarray(base.convert("RGB")), (x0, y0, x1, y1)
+
+
+def _dashes(draw: object, ends: NDArray[np.float64], unit: float) -> None:
+    """The line of the hinge as draughtsmen draw an axis: a dash and a dot."""
+    length = float(np.linalg.norm(ends[1] - ends[0]))
+    if length < 1.0:
+        return
+    way = (ends[1] - ends[0]) / length
+    for rim, colour in ((2.2, (255, 255, 255, 200)), (0.0, (20, 20, 20, 255))):
+        at = 0.0
+        for number in range(200):
+            dash = (11 if number % 2 == 0 else 2) * unit
+            if at >= length:
+                break
+            stop = min(at + dash, length)
+            draw.line(  # type: ignore[attr-defined]
+                [tuple(ends[0] + at * way), tuple(ends[0] + stop * way)],
+                fill=colour,
+                width=round((1.8 + rim) * unit),
+            )
+            at += dash + 5 * unit
+
+
+def _head(line: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+    """Corners of the arrow's head."""
+    tip = line[-1]
+    far = line[np.linalg.norm(line - tip, axis=1) > 0.7 * size]
+    tail = far[-1] if len(far) else line[0]
+    way = tip - tail
+    length = float(np.linalg.norm(way))
+    way = way / length if length > 1e-9 else np.array([1.0, 0.0])
+    side = np.array([-way[1], way[0]])
+    return np.array([tip, tip - way * size + side * size * 0.55, tip - way * size - side * size * 0.55])
+
+
+def _label_place(
+    line: NDArray[np.float64],
+    bounds: tuple[float, float, float, float],
+    size: tuple[int, int],
+    unit: float,
+) -> tuple[float, float, float, float]:
+    """Where the angle is written: beside the middle of the arrow, on its outer side, inside."""
+    wide, tall = bounds[2] - bounds[0] + 12 * unit, bounds[3] - bounds[1] + 10 * unit
+    middle = line[len(line) // 2]
+    out = middle - (line[0] + line[-1]) / 2
+    length = float(np.linalg.norm(out))
+    out = out / length if length > unit else np.array([0.0, -1.0])
+    x, y = middle + out * (0.5 * max(wide, tall) + 8 * unit)
+    x = float(np.clip(x, wide / 2 + unit, size[0] - wide / 2 - unit))
+    y = float(np.clip(y, tall / 2 + unit, size[1] - tall / 2 - unit))
+    return (x - wide / 2, y - tall / 2, x + wide / 2, y + tall / 2)
