@@ -38,6 +38,7 @@ def write_plates(
     kit: ApartKit,
     colours: NDArray[np.uint8],
     metadata: Mapping[str, str],
+    auxiliaries: Mapping[str, bytes] | None = None,
 ) -> None:
     """Write the plates for any slicer, all of them for Bambu Studio, and the order of assembly.
 
@@ -57,6 +58,8 @@ def write_plates(
         Colour of each body, sRGB.
     metadata : mapping of str to str
         Facts about the files.
+    auxiliaries : mapping of str to bytes, optional
+        Files that Bambu Studio shows beside the model.
     """
     plates = kit.plates
     remove_plates(folder, keep=plates.count)
@@ -101,6 +104,7 @@ def write_plates(
             ),
             "project_settings.config": bambu_project(plates.bed_mm),
         },
+        auxiliaries=auxiliaries,
     )
     write_json(folder / "assembly.json", assembly_data(tree, joinery, kit))
 

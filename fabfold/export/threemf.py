@@ -47,6 +47,12 @@ from fabfold.joinery.bodies import Joinery
 __all__ = ["Layout", "posed", "write_3mf"]
 
 #: How the bodies are grouped in the file; see the description above.
+#: Kinds of the files that may come with a model.
+_CONTENT_TYPES = {"pdf": "application/pdf", "csv": "text/csv"}
+
+#: Kinds of the files that may come with a model.
+_CONTENT_TYPES = {"pdf": "application/pdf", "csv": "text/csv"}
+
 Layout = Literal["kit", "assembly", "apart"]
 
 #: Metadata names that the core specification knows; all others get a name space of their own.
@@ -105,6 +111,7 @@ def write_3mf(
     thumbnail: bytes | None = None,
     keep_place: bool = False,
     settings: Callable[[list[int]], Mapping[str, str]] | None = None,
+    auxiliaries: Mapping[str, bytes] | None = None,
 ) -> None:
     """Write the bodies as one 3MF file; the same input gives the same bytes.
 
@@ -132,6 +139,9 @@ def write_3mf(
     settings : callable, optional
         Files of slicer settings by name, in place of the layout's own; it is given the number of
         each body's object.
+    auxiliaries : mapping of str to bytes, optional
+        Files that come with the model, by folder and name: Bambu Studio shows those in
+        ``Assembly Guide``, ``Bill of Materials`` and ``Model Pictures``.
 
     Raises
     ------
@@ -197,14 +207,25 @@ def write_3mf(
     for index, entry in enumerate(built):
         item = model.AddBuildItem(entry, place)
         item.SetUUID(str(uuid.uuid5(space, f"item {index}")))
-    _attach(model, attached, thumbnail)
+    _attach(model, attached, thumbnail, auxiliaries or {})
     writer = model.QueryWriter("3mf")
     writer.SetDecimalPrecision(_DECIMALS)
     write_bytes(path, _repacked(package_bytes(writer)))
 
 
-def _attach(model: Any, settings: Mapping[str, str], thumbnail: bytes | None) -> None:
-    """Put files of slicer settings, by name, and a thumbnail into the package."""
+def _attach(
+    model: Any,
+    settings: Mapping[str, str],
+    thumbnail: bytes | None,
+    auxiliaries: Mapping[str, bytes],
+) -> None:
+    """Put files of slicer settings, by name, a thumbnail and others into the package."""
+    for ending, kind in _CONTENT_TYPES.items():
+        if any(name.endswith(f".{ending}") for name in auxiliaries):
+            model.AddCustomContentType(ending, kind)
+    for name, content in auxiliaries.items():
+        attachment = model.AddAttachment(f"/Auxiliaries/{name}", _RELATIONSHIP)
+        attachment.ReadFromBuffer(content)
     if settings:
         model.AddCustomContentType("config", "text/xml")
     for file_name, text in settings.items():

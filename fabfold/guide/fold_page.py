@@ -12,10 +12,8 @@ import json
 import re
 import zipfile
 import zlib
-from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,16 +22,14 @@ from numpy.typing import NDArray
 from fabfold.errors import GeometryError
 from fabfold.export.shading import split_vertices
 from fabfold.export.weld import printable_mesh
-from fabfold.files import write_text
 from fabfold.fold.motion import Motion
-from fabfold.guide.fold_steps import FoldStep
-from fabfold.guide.step_views import StepView
+from fabfold.guide.manual import StepPlan
 from fabfold.guide.wording import step_text
 from fabfold.joinery.bodies import Joinery
 from fabfold.srgb import hex_of_colour
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["fold_page", "three_js", "write_fold_page"]
+__all__ = ["fold_page", "three_js"]
 
 
 def three_js() -> str:
@@ -51,7 +47,9 @@ def three_js() -> str:
     except (OSError, zipfile.BadZipFile, UnicodeDecodeError) as error:
         raise GeometryError(f"fold.html: trimesh's viewer cannot be read: {error}") from error
     # Its licence and then one long line; the parts of the viewer follow in the same element.
-    found = re.search(r"<script>(/\*\*\s*\* @license[^/]*Three\.js Authors[^/]*\*/\s*\n[^\n]+)", page)
+    found = re.search(
+        r"<script>(/\*\*\s*\* @license[^/]*Three\.js Authors[^/]*\*/\s*\n[^\n]+)", page
+    )
     if found is None:
         raise GeometryError("fold.html: this version of trimesh brings no three.js; install 4.5")
     return found[1]
@@ -90,8 +88,7 @@ def fold_page(
     joinery: Joinery,
     tree: FoldTree,
     motion: Motion,
-    steps: Sequence[FoldStep],
-    views: Sequence[StepView],
+    plan: StepPlan,
     *,
     title: str,
     facts: str,
@@ -107,10 +104,8 @@ def fold_page(
         The bodies and hinges, in the same order.
     motion : Motion
         The certified path.
-    steps : sequence of FoldStep
-        Its steps.
-    views : sequence of StepView
-        From where each is seen, and at the end the whole.
+    plan : StepPlan
+        Its steps, and from where each is seen.
     title, facts : str
         Heading, and a line below it.
     colours : (b, 3) uint8 array
@@ -143,7 +138,7 @@ def fold_page(
         }
     angles = motion.angles_deg[0].copy()
     told: list[dict[str, Any]] = []
-    for step, view in zip(steps, views, strict=False):
+    for step, view in zip(plan.steps, plan.views, strict=False):
         # The page's own nodes stand at their pivots.
         held = step.before[step.held].copy()
         held[:3, 3] += held[:3, :3] @ pivots[step.held]
@@ -161,7 +156,7 @@ def fold_page(
         )
         angles[step.hinge] += step.change_deg
     kit = {
-        "view": [views[-1].azimuth_deg, views[-1].elevation_deg],
+        "view": [plan.views[-1].azimuth_deg, plan.views[-1].elevation_deg],
         "bodies": entries,
         "steps": told,
     }
@@ -174,8 +169,3 @@ def fold_page(
     }
     page = files("fabfold.guide").joinpath("fold_page.html").read_text("utf-8")
     return re.sub(r"\{\{([A-Z]+)\}\}", lambda found: parts[found[1]], page)
-
-
-def write_fold_page(path: Path, page: str) -> None:
-    """Write the page in one step."""
-    write_text(path, page)

@@ -152,4 +152,3 @@ def fold_steps(
             steps.append(replace(step, after=poses))
             angles[column] = motion.angles_deg[row, column]
     return steps
-

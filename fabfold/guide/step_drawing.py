@@ -136,7 +136,7 @@ def draw_step(
     after = _points(meshes, step.after, every)
     within = np.concatenate([after, arc])
     look = View(
-        view.azimuth_deg, view.elevation_deg, size=size, ground=False, lights=8, margin=0.05
+        view.azimuth_deg, view.elevation_deg, size=size, ground=False, lights=4, margin=0.05
     )
     colours = np.array([MOVING if body in step.moving else STAYING for body in every], np.uint8)
     image = render(meshes, colours, step.before, look, within=within)
@@ -204,7 +204,9 @@ def _with_marks(
     head = _head(line, 17 * unit)
     body = line[: max(2, int(np.ceil(len(line) * 0.97)))]
     for wide, colour in ((10.5, (255, 255, 255, 235)), (5.5, (20, 20, 20, 255))):
-        draw.line([tuple(p) for p in body.tolist()], fill=colour, width=round(wide * unit), joint="curve")
+        draw.line(
+            [tuple(p) for p in body.tolist()], fill=colour, width=round(wide * unit), joint="curve"
+        )
         rim = (wide - 5.5) * unit / 2
         middle = head.mean(axis=0)
         grown = middle + (head - middle) * (1 + 2.2 * rim / (17 * unit))
@@ -213,7 +215,11 @@ def _with_marks(
     label = _label_place(line, draw.textbbox((0, 0), text, font=font), layer.size, unit)
     draw.rounded_rectangle(label, radius=7 * unit, fill=(255, 255, 255, 225))
     draw.text(
-        ((label[0] + label[2]) / 2, (label[1] + label[3]) / 2), text, font=font, fill=(20, 20, 20, 255), anchor="mm"
+        ((label[0] + label[2]) / 2, (label[1] + label[3]) / 2),
+        text,
+        font=font,
+        fill=(20, 20, 20, 255),
+        anchor="mm",
     )
     small = layer.resize((width, height), PillowImage.Resampling.BOX)
     base = PillowImage.fromarray(image).convert("RGBA")
@@ -252,7 +258,9 @@ def _head(line: NDArray[np.float64], size: float) -> NDArray[np.float64]:
     length = float(np.linalg.norm(way))
     way = way / length if length > 1e-9 else np.array([1.0, 0.0])
     side = np.array([-way[1], way[0]])
-    return np.array([tip, tip - way * size + side * size * 0.55, tip - way * size - side * size * 0.55])
+    return np.array(
+        [tip, tip - way * size + side * size * 0.55, tip - way * size - side * size * 0.55]
+    )
 
 
 def _label_place(

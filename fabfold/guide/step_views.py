@@ -64,9 +64,7 @@ class _Blocks:
     def posed(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """Vertices (v, 3) where the bodies are."""
         mine = poses[self.body]
-        return np.asarray(
-            np.einsum("vij,vj->vi", mine[:, :3, :3], self.vertices) + mine[:, :3, 3]
-        )
+        return np.asarray(np.einsum("vij,vj->vi", mine[:, :3, :3], self.vertices) + mine[:, :3, 3])
 
 
 _CUBE = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -93,8 +91,8 @@ def _blocks(joinery: Joinery, tree: FoldTree) -> _Blocks:
             cubes.append((low + high) / 2 + (high - low) * _CUBE)
             owners.append(index)
     faces = np.concatenate([_CUBE_FACES + 8 * number for number in range(len(cubes))])
-    body = np.repeat(np.array(owners, dtype=np.int32), 8)
-    return _Blocks(np.concatenate(cubes), faces.astype(np.int32), body)
+    owner = np.repeat(np.array(owners, dtype=np.int32), 8)
+    return _Blocks(np.concatenate(cubes), faces.astype(np.int32), owner)
 
 
 def visible_shares(
@@ -141,9 +139,7 @@ def _directions() -> Iterator[tuple[float, float]]:
             yield float(azimuth), float(height)
 
 
-def _score(
-    blocks: _Blocks, step: FoldStep, direction: tuple[float, float]
-) -> tuple[float, float]:
+def _score(blocks: _Blocks, step: FoldStep, direction: tuple[float, float]) -> tuple[float, float]:
     """How well a step is seen from a direction, and how much of what moves is seen."""
     before, after = blocks.posed(step.before), blocks.posed(step.after)
     moving = np.isin(blocks.body, step.moving)[blocks.faces[:, 0]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from fabfold.export.urdf import write_urdf
 from fabfold.files import write_bytes, write_json, write_text
 from fabfold.joinery.magnets import Retention
 from fabfold.kit.box_closure import BoxClosure
+from fabfold.kit.guide_files import write_guide
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.lattice.template import Template
 from fabfold.printing.checks import Check
@@ -241,7 +242,13 @@ def write_built(folder: Path, built: BuiltTree) -> None:
     write_stl(folder / "bodies", joinery)
 
 
-def write_printable(folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltTree) -> None:
+def write_printable(
+    folder: Path,
+    recipe: Recipe,
+    mode: PrintMode,
+    built: BuiltTree,
+    guide: Mapping[str, bytes] | None = None,
+) -> None:
     """Write the tree, its certified motion, the bodies as STL, 3MF and URDF, and what to buy.
 
     Parameters
@@ -254,6 +261,8 @@ def write_printable(folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltT
         How it is printed; the profile is named in the 3MF.
     built : BuiltTree
         What is written.
+    guide : mapping of str to bytes, optional
+        Manual and pictures for Bambu Studio, by folder and name.
     """
     from fabfold.apart.plate_files import remove_plates, write_bill, write_plates
 
@@ -268,8 +277,13 @@ def write_printable(folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltT
         ),
     }
     write_built(folder, built)
+    magnets = 0 if built.retention is None else 2 * len(built.retention.pairs)
+    write_bill(folder, joinery, mode.profile.material, mode.pin, (magnets, mode.magnet))
+    beside: dict[str, bytes] = dict(guide or {})
+    if guide:
+        beside["Bill of Materials/bom.csv"] = (folder / "bom.csv").read_bytes()
     if built.apart is not None:
-        write_plates(folder, name, tree, joinery, built.apart, colours, metadata)
+        write_plates(folder, name, tree, joinery, built.apart, colours, metadata, beside)
     else:
         remove_plates(folder)
         title = f"{name} folds into {tree.template.name}"
@@ -290,14 +304,13 @@ def write_printable(folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltT
             colours=colours,
             layout="assembly",
             thumbnail=picture,
+            auxiliaries=beside,
         )
     if built.retention is not None:
         write_json(folder / "retention.json", _retention_data(built, built.retention))
     else:
         (folder / "retention.json").unlink(missing_ok=True)
     write_urdf(folder / f"{name}.urdf", joinery, tree, built.planned.motion, name)
-    magnets = 0 if built.retention is None else 2 * len(built.retention.pairs)
-    write_bill(folder, joinery, mode.profile.material, mode.pin, (magnets, mode.magnet))
 
 
 def write_checks(
@@ -356,8 +369,10 @@ def write_kit(
     name = recipe.name
     colours = body_colours(tree)
     write_text(folder / "kit.toml", recipe.to_toml())
-    progress.update(0.1, "bodies and 3MF")
-    write_printable(folder, recipe, mode, built)
+    progress.update(0.05, "pictures of the steps")
+    guide = write_guide(folder, recipe, mode, built)
+    progress.update(0.5, "bodies and 3MF")
+    write_printable(folder, recipe, mode, built, guide)
     flat = None if template is None else flat_poses(joinery, tree, motion, template)
     if flat is None:
         (folder / f"{name}-flat.3mf").unlink(missing_ok=True)
@@ -369,9 +384,9 @@ def write_kit(
             metadata={"Application": f"fabfold {__version__}"},
             colours=colours,
         )
-    progress.update(0.3, "animation")
+    progress.update(0.6, "animation")
     write_glb(folder / "fold.glb", joinery, tree, motion, title=name, colours=colours)
-    progress.update(0.4, "picture")
+    progress.update(0.7, "picture")
     upright = built.planned.voxels.rotation.T
     write_strip(folder / "fold.png", joinery, tree, motion, colours=colours, upright=upright)
     progress.update(0.8, "STEP")

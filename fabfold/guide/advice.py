@@ -1,0 +1,120 @@
+"""What a manual says of what is in the box, of printing, and of putting together."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fabfold.guide.wording import listed
+from fabfold.joinery.bodies import Joinery
+from fabfold.printing.print_mode import PINS, PrintMode
+from fabfold.tree.fold_tree import FoldTree
+
+if TYPE_CHECKING:
+    from fabfold.apart.apart_kit import ApartKit
+    from fabfold.joinery.magnets import Retention
+
+__all__ = ["WAY_BACK", "assembly_lines", "content_lines", "print_lines"]
+
+#: What the last page says.
+WAY_BACK = (
+    "To unfold the box, follow the steps from the last to the first, and turn each arrow round. "
+    "Never force a hinge: if it does not turn, the step before it is not done to its end."
+)
+
+
+def _part(body: int) -> str:
+    return str(body + 1)
+
+
+def content_lines(
+    joinery: Joinery, tree: FoldTree, mode: PrintMode, retention: Retention | None
+) -> list[str]:
+    """What is in the box, a line each.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The printed bodies and pins.
+    tree : FoldTree
+        The bodies and hinges.
+    mode : PrintMode
+        How it is printed.
+    retention : Retention or None
+        The magnets, where there are any.
+    """
+    links = sum(not len(body.voxels) for body in tree.bodies)
+    plates = f", {links} of them link plates" if links else ""
+    lines = [f"{len(tree.bodies)} printed parts{plates}, {len(tree.hinges)} hinges"]
+    lines[0] += "" if mode.apart else " that are printed in place, already joined"
+    if joinery.pins:
+        total = sum(pin.length_mm for pin in joinery.pins)
+        lines.append(
+            f"{len(joinery.pins)} pins of {PINS[mode.pin][1]}, {total / 10:.0f} cm in all "
+            "(lengths in bom.csv)"
+        )
+    if retention is not None and retention.pairs:
+        lines.append(f"{2 * len(retention.pairs)} magnets of {retention.magnet} mm")
+    size = joinery.voxel_mm
+    shape = " × ".join(f"{side * size:g}" for side in tree.template.shape)
+    lines.append(f"closed, it measures {shape} mm")
+    return lines
+
+
+def print_lines(mode: PrintMode, joinery: Joinery) -> list[str]:
+    """How to print it, a line each.
+
+    Parameters
+    ----------
+    mode : PrintMode
+        How it is printed, with its profile.
+    joinery : Joinery
+        The bodies, with their clearance.
+    """
+    profile = mode.profile
+    lines = [
+        f"Profile {profile.name}: {profile.process}, {profile.material or 'any material'}; the "
+        f"hinges have a clearance of {joinery.clearance_mm:g} mm.",
+        "Never scale the files in the slicer: gaps would grow or close. Make the kit again with "
+        "another --voxel-mm or --box-mm.",
+    ]
+    if profile.nozzle_mm is not None:
+        lines += [
+            "Slice gap closing radius: 0.049 mm at most. Beam interlocking: off. Elephant foot "
+            "compensation: on.",
+        ]
+    if mode.apart:
+        lines.append(
+            "Print the plates as they lie. Supports only from the plate, and only for the parts "
+            "that the report names; none inside bores."
+        )
+        lines.append("A brim where the report names a part that stands on little.")
+    else:
+        lines.append(
+            "Print it as it lies, as one object. Let it cool, free it from powder or support, and "
+            "turn every hinge once to and fro."
+        )
+    return lines
+
+
+def assembly_lines(joinery: Joinery, kit: ApartKit | None) -> list[str]:
+    """How the parts are put together, a line a pin.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The bodies with their pins.
+    kit : ApartKit or None
+        The order of assembly; None where it is printed in place.
+    """
+    if kit is None:
+        return []
+    lines = []
+    for step in kit.steps:
+        pin = joinery.pins[step.pin]
+        rests = listed([_part(body) for body in step.sides[0]])
+        comes = listed([_part(body) for body in step.sides[1]])
+        lines.append(
+            f"Bring {comes} to {rests}, and push in a pin of {pin.length_mm:.1f} mm "
+            f"until it stands in part {_part(pin.owner)}."
+        )
+    return lines

@@ -1,0 +1,203 @@
+"""What a folding manual says and shows, whatever it is printed on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfold.export.camera import View
+from fabfold.export.kit_picture import picture_of_kit, strip
+from fabfold.export.render import Image, Mesh
+from fabfold.export.weld import printable_mesh
+from fabfold.fold.motion import Motion
+from fabfold.guide.fold_steps import FoldStep, fold_steps
+from fabfold.guide.step_drawing import StepPicture, draw_step
+from fabfold.guide.step_views import StepView, step_views
+from fabfold.guide.wording import step_text
+from fabfold.joinery.bodies import Joinery
+from fabfold.lattice.rotations import ROTATIONS
+from fabfold.progress import Progress, SilentProgress
+from fabfold.tree.fold_tree import FoldTree
+
+__all__ = ["Manual", "ManualStep", "StepPlan", "draw_manual", "plan_steps"]
+
+#: Size of the picture of a step, and height of the one on the cover, in pixels.
+STEP_PIXELS, COVER_PIXELS = (600, 450), 560
+
+
+@dataclass(frozen=True)
+class StepPlan:
+    """The steps of a kit, and from where each is seen.
+
+    Attributes
+    ----------
+    stand : (3, 3) float64 array
+        Rotation from shape A's axes to how the kit lies on the table.
+    steps : tuple of FoldStep
+        The steps.
+    views : tuple of StepView
+        One for each, and one for the end.
+    """
+
+    stand: NDArray[np.float64]
+    steps: tuple[FoldStep, ...]
+    views: tuple[StepView, ...]
+
+
+@dataclass(frozen=True)
+class ManualStep:
+    """A step of the manual.
+
+    Attributes
+    ----------
+    number : int
+        From 1.
+    text : str
+        How far, and which parts.
+    turned : bool
+        Whether the whole is turned before it.
+    picture : StepPicture
+        The picture.
+    """
+
+    number: int
+    text: str
+    turned: bool
+    picture: StepPicture
+
+
+@dataclass(frozen=True)
+class Manual:
+    """A manual, ready to be laid out.
+
+    Attributes
+    ----------
+    title : str
+        Name of the kit.
+    subtitle : str
+        What it folds into, in how many steps.
+    cover : (h, w, 3) uint8 array
+        A, half-way and B.
+    contents : tuple of str
+        What is in the box.
+    advice : tuple of str
+        How to print it.
+    assembly : tuple of str
+        How single bodies are put together; empty where it is printed in place.
+    steps : tuple of ManualStep
+        The steps.
+    end : (h, w, 3) uint8 array
+        The closed box.
+    """
+
+    title: str
+    subtitle: str
+    cover: Image
+    contents: tuple[str, ...]
+    advice: tuple[str, ...]
+    assembly: tuple[str, ...]
+    steps: tuple[ManualStep, ...]
+    end: Image
+
+
+def plan_steps(
+    joinery: Joinery, tree: FoldTree, motion: Motion, upright: NDArray[np.float64]
+) -> StepPlan:
+    """Steps and views of a certified path.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The printed bodies in shape A.
+    tree : FoldTree
+        The bodies and hinges, in the same order.
+    motion : Motion
+        The path.
+    upright : (3, 3) float64 array
+        Rotation from shape A's axes to the model's own; the nearest of the lattice is taken, so
+        that the box stands straight.
+    """
+    traces = np.einsum("rij,ij->r", ROTATIONS, upright)
+    stand = np.asarray(ROTATIONS[int(np.round(traces, 9).argmax())], dtype=np.float64)
+    steps = fold_steps(joinery, tree, motion, stand)
+    return StepPlan(stand, tuple(steps), tuple(step_views(joinery, tree, steps)))
+
+
+def draw_manual(
+    joinery: Joinery,
+    tree: FoldTree,
+    motion: Motion,
+    plan: StepPlan,
+    *,
+    title: str,
+    upright: NDArray[np.float64],
+    colours: NDArray[np.uint8],
+    contents: Sequence[str],
+    advice: Sequence[str],
+    assembly: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Manual:
+    """Draw all pictures of a manual.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        The printed bodies in shape A.
+    tree : FoldTree
+        The bodies and hinges, in the same order.
+    motion : Motion
+        The path.
+    plan : StepPlan
+        Its steps and views.
+    title : str
+        Name of the kit.
+    upright : (3, 3) float64 array
+        Rotation from shape A's axes to the model's own.
+    colours : (b, 3) uint8 array
+        Colour of each body, sRGB.
+    contents, advice, assembly : sequence of str
+        See :class:`Manual`.
+    progress : Progress, optional
+        Hears of every step.
+
+    Returns
+    -------
+    Manual
+        To be laid out by :mod:`fabfold.guide.manual_pdf` or :mod:`fabfold.guide.manual_html`.
+    """
+    progress = progress or SilentProgress()
+    meshes: list[Mesh] = []
+    for body in joinery.bodies:
+        vertices, faces = printable_mesh(body)
+        meshes.append((vertices.astype(np.float64), faces))
+    drawn = []
+    for step, view in zip(plan.steps, plan.views, strict=False):
+        picture = draw_step(meshes, step, view, joinery.voxel_mm, STEP_PIXELS)
+        drawn.append(ManualStep(step.number, step_text(step), view.turned, picture))
+        progress.update(step.number / (len(plan.steps) + 1), f"step {step.number}")
+    count = len(plan.steps)
+    last = plan.views[-1]
+    end = View(last.azimuth_deg, last.elevation_deg, size=STEP_PIXELS, lights=12)
+    box = "a box" if tree.template.name.startswith("box-") else tree.template.name
+    return Manual(
+        title=title,
+        subtitle=f"folds into {box} in {count} step{'s' if count != 1 else ''}",
+        cover=strip(
+            joinery,
+            tree,
+            motion,
+            View(size=(COVER_PIXELS, COVER_PIXELS), lights=12),
+            colours=colours,
+            upright=upright,
+        ),
+        contents=tuple(contents),
+        advice=tuple(advice),
+        assembly=tuple(assembly),
+        steps=tuple(drawn),
+        end=picture_of_kit(
+            joinery, tree, motion.angles_deg[-1], end, colours=colours, upright=plan.stand
+        ),
+    )

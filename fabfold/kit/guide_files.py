@@ -1,0 +1,76 @@
+"""Write what people fold a kit by: the manual, and the page that plays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fabfold.export.colours import body_colours
+from fabfold.export.render import png_bytes
+from fabfold.files import write_bytes, write_text
+from fabfold.guide.advice import assembly_lines, content_lines, print_lines
+from fabfold.guide.fold_page import fold_page
+from fabfold.guide.manual import draw_manual, plan_steps
+from fabfold.guide.manual_html import manual_html
+from fabfold.guide.manual_pdf import manual_pdf
+from fabfold.kit.stages import BuiltTree
+from fabfold.printing.print_mode import PrintMode
+from fabfold.recipe.recipe import Recipe
+
+__all__ = ["write_guide"]
+
+
+def write_guide(
+    folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltTree
+) -> dict[str, bytes]:
+    """Write ``manual.pdf``, ``manual-letter.pdf``, ``manual.html`` and ``fold.html``.
+
+    Parameters
+    ----------
+    folder : Path
+        Kit folder.
+    recipe : Recipe
+        Names the kit.
+    mode : PrintMode
+        How it is printed.
+    built : BuiltTree
+        Tree, motion with certificate, and printed bodies.
+
+    Returns
+    -------
+    dict of str to bytes
+        What of it goes into the 3MF for Bambu Studio, by folder and name.
+    """
+    tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
+    upright, colours = built.planned.voxels.rotation.T, body_colours(tree)
+    plan = plan_steps(joinery, tree, motion, upright)
+    manual = draw_manual(
+        joinery,
+        tree,
+        motion,
+        plan,
+        title=recipe.name,
+        upright=upright,
+        colours=colours,
+        contents=content_lines(joinery, tree, mode, built.retention),
+        advice=print_lines(mode, joinery),
+        assembly=assembly_lines(joinery, built.apart),
+    )
+    paper = manual_pdf(manual, "a4")
+    write_bytes(folder / "manual.pdf", paper)
+    write_bytes(folder / "manual-letter.pdf", manual_pdf(manual, "letter"))
+    write_text(folder / "manual.html", manual_html(manual))
+    facts = f"{len(tree.bodies)} parts, {len(tree.hinges)} hinges, {manual.subtitle}"
+    page = fold_page(
+        joinery,
+        tree,
+        motion,
+        plan,
+        title=recipe.name,
+        facts=facts,
+        colours=colours,
+    )
+    write_text(folder / "fold.html", page)
+    return {
+        "Assembly Guide/manual.pdf": paper,
+        "Model Pictures/folding.png": png_bytes(manual.cover),
+    }
