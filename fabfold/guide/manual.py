@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.export.camera import View
-from fabfold.export.kit_picture import picture_of_kit, strip
+from fabfold.export.kit_picture import picture_of_kit
 from fabfold.export.render import Image, Mesh
 from fabfold.export.weld import printable_mesh
 from fabfold.fold.motion import Motion
@@ -24,8 +24,8 @@ from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["Manual", "ManualStep", "StepPlan", "draw_manual", "plan_steps"]
 
-#: Size of the picture of a step, and height of the one on the cover, in pixels.
-STEP_PIXELS, COVER_PIXELS = (600, 450), 560
+#: Size of the picture of a step in pixels.
+STEP_PIXELS = (600, 450)
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def draw_manual(
     plan: StepPlan,
     *,
     title: str,
-    upright: NDArray[np.float64],
+    cover: Image,
     colours: NDArray[np.uint8],
     contents: Sequence[str],
     advice: Sequence[str],
@@ -154,8 +154,8 @@ def draw_manual(
         Its steps and views.
     title : str
         Name of the kit.
-    upright : (3, 3) float64 array
-        Rotation from shape A's axes to the model's own.
+    cover : (h, w, 3) uint8 array
+        A, half-way and B, see :func:`fabfold.export.kit_picture.strip`.
     colours : (b, 3) uint8 array
         Colour of each body, sRGB.
     contents, advice, assembly : sequence of str
@@ -185,14 +185,7 @@ def draw_manual(
     return Manual(
         title=title,
         subtitle=f"folds into {box} in {count} step{'s' if count != 1 else ''}",
-        cover=strip(
-            joinery,
-            tree,
-            motion,
-            View(size=(COVER_PIXELS, COVER_PIXELS), lights=12),
-            colours=colours,
-            upright=upright,
-        ),
+        cover=cover,
         contents=tuple(contents),
         advice=tuple(advice),
         assembly=tuple(assembly),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fabfold.export.colours import body_colours
+from fabfold.export.kit_picture import strip
 from fabfold.export.render import png_bytes
 from fabfold.files import write_bytes, write_text
 from fabfold.guide.advice import assembly_lines, content_lines, print_lines
@@ -22,7 +23,7 @@ __all__ = ["write_guide"]
 def write_guide(
     folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltTree
 ) -> dict[str, bytes]:
-    """Write ``manual.pdf``, ``manual-letter.pdf``, ``manual.html`` and ``fold.html``.
+    """Write ``fold.png``, ``manual.pdf``, ``manual-letter.pdf``, ``manual.html``, ``fold.html``.
 
     Parameters
     ----------
@@ -42,6 +43,9 @@ def write_guide(
     """
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
     upright, colours = built.planned.voxels.rotation.T, body_colours(tree)
+    cover = strip(joinery, tree, motion, colours=colours, upright=upright)
+    picture = png_bytes(cover)
+    write_bytes(folder / "fold.png", picture)
     plan = plan_steps(joinery, tree, motion, upright)
     manual = draw_manual(
         joinery,
@@ -49,7 +53,7 @@ def write_guide(
         motion,
         plan,
         title=recipe.name,
-        upright=upright,
+        cover=cover,
         colours=colours,
         contents=content_lines(joinery, tree, mode, built.retention),
         advice=print_lines(mode, joinery),
@@ -72,5 +76,5 @@ def write_guide(
     write_text(folder / "fold.html", page)
     return {
         "Assembly Guide/manual.pdf": paper,
-        "Model Pictures/folding.png": png_bytes(manual.cover),
+        "Model Pictures/folding.png": picture,
     }

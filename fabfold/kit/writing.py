@@ -10,7 +10,6 @@ from fabfold.export.bambu import BAMBU
 from fabfold.export.colours import body_colours
 from fabfold.export.flat import flat_poses
 from fabfold.export.glb import write_glb
-from fabfold.export.kit_picture import write_strip
 from fabfold.export.render import png_bytes, thumbnail
 from fabfold.export.report import write_report
 from fabfold.export.sketch import picture_of_tree
@@ -98,7 +97,8 @@ def write_stage(kit: Kit, stage: str, result: Any) -> None:
     if stage == "check":
         wishes = kit.wish_report(built.planned, built.joinery)
         closure = kit.box_closure(built.planned)
-        write_checks(folder, kit.cut_solid(), built, result, wishes, closure)
+        profile = kit.print_mode().profile.name
+        write_checks(folder, kit.cut_solid(), built, result, wishes, closure, profile)
 
 
 def kit_summary(
@@ -106,6 +106,7 @@ def kit_summary(
     built: BuiltTree,
     wishes: Sequence[dict[str, Any]] = (),
     closure: BoxClosure | None = None,
+    profile: str = "",
 ) -> dict[str, Any]:
     """Figures of a kit for its report: counts, volumes, energies (JSON-ready)."""
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
@@ -143,7 +144,9 @@ def kit_summary(
         "dropped_mm3": round(joinery.dropped_mm3, 2),
         "struts": joinery.struts,
         "volume_mm3": round(sum(body.volume for body in joinery.bodies), 1),
+        "box_mm": [side * joinery.voxel_mm for side in tree.template.shape],
         "print": "in-place" if built.apart is None else "apart",
+        **({"profile": profile} if profile else {}),
         **_printed_apart(built),
         **(
             {}
@@ -320,9 +323,12 @@ def write_checks(
     checks: list[Check],
     wishes: Sequence[dict[str, Any]] = (),
     closure: BoxClosure | None = None,
+    profile: str = "",
+    pictures: Sequence[tuple[str, bytes]] = (),
 ) -> None:
     """Write ``report.json`` and ``report.html``, with what became of each wish and of the box."""
-    write_report(folder, checks, kit_summary(solid, built, wishes, closure))
+    summary = kit_summary(solid, built, wishes, closure, profile)
+    write_report(folder, checks, summary, title=solid.name, pictures=pictures)
 
 
 def write_kit(
@@ -386,11 +392,9 @@ def write_kit(
         )
     progress.update(0.6, "animation")
     write_glb(folder / "fold.glb", joinery, tree, motion, title=name, colours=colours)
-    progress.update(0.7, "picture")
-    upright = built.planned.voxels.rotation.T
-    write_strip(folder / "fold.png", joinery, tree, motion, colours=colours, upright=upright)
     progress.update(0.8, "STEP")
     finish_step()
     progress.update(0.95, "report")
-    write_checks(folder, solid, built, checks, wishes, closure)
+    pictures = [("As it is printed, half-way, and folded", (folder / "fold.png").read_bytes())]
+    write_checks(folder, solid, built, checks, wishes, closure, mode.profile.name, pictures)
     progress.update(1.0, str(folder))
