@@ -381,7 +381,7 @@ def test_report_json_and_page(tmp_path):
     }
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "1 of 3 checks failed" in page
-    assert "wall &lt;thin&gt;" in page and "http" not in page
+    assert "wall &lt;thin&gt;" in page and "://" not in page
 
 
 # the same bytes -------------------------------------------------------------------------------

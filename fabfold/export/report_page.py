@@ -37,7 +37,7 @@ summary { cursor: pointer; font-weight: 600; margin: 1.5rem 0 .5rem; }
 """
 
 #: Checks that say whether it folds; all others are of printing.
-_FOLDING = ("fold", "path", "replay", "moves with", "pins that", "hinges that")
+_FOLDING = ("tree folds", "path", "replay", "moves with", "pins that", "hinges that")
 _PATH = "smallest gap on the folding path"
 
 
@@ -48,7 +48,9 @@ def _cell(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.4g}" if 1e-3 <= abs(value) < 1e5 or value == 0 else f"{value:.2e}"
+        plain = 1e-3 <= abs(value) < 1e4 or value == 0
+        large = 1e4 <= abs(value) < 1e9
+        return f"{value:,.0f}" if large else f"{value:.4g}" if plain else f"{value:.2e}"
     if isinstance(value, dict):
         return ", ".join(f"{key} {_cell(entry)}" for key, entry in value.items())
     if isinstance(value, list):
@@ -147,6 +149,8 @@ def _next_steps(summary: Mapping[str, Any]) -> str:
 def _limit(check: Mapping[str, Any]) -> str:
     """Figure, and limit in words: whether it may be more or less is seen from the verdict."""
     figure, limit = check["figure"], check["limit"]
+    if not check["unit"] and limit == 1.0:
+        return "yes" if figure == 1.0 else "no"
     text = f"{_cell(figure)} {check['unit']}".strip()
     if limit is None or isinstance(figure, str):
         return text

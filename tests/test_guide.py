@@ -1,0 +1,190 @@
+"""The manual and the page: what they show is the certified path."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import zipfile
+from itertools import combinations, pairwise
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fabfold.export.camera import View, direction_frame, project
+from fabfold.export.weld import printable_mesh
+from fabfold.guide.fold_steps import turned
+from fabfold.guide.manual import STEP_PIXELS, plan_steps
+from fabfold.guide.step_drawing import MOVING, draw_step
+from fabfold.guide.step_views import _blocks, visible_shares
+from fabfold.joinery.body_poses import poses_in_mm
+
+#: Least share of what moves that must be seen at the start of a step, and pixels that it covers.
+LEAST_SEEN, LEAST_PIXELS = 0.3, 1500
+
+
+@pytest.fixture(scope="module")
+def kit(bar_kit: Any) -> SimpleNamespace:
+    built = bar_kit.join()
+    joinery, tree, motion = built.joinery, built.planned.tree, built.planned.motion
+    plan = plan_steps(joinery, tree, motion, built.planned.voxels.rotation.T)
+    meshes = [(v.astype(float), f) for v, f in map(printable_mesh, joinery.bodies)]
+    return SimpleNamespace(
+        joinery=joinery, tree=tree, motion=motion, plan=plan, meshes=meshes, folder=bar_kit.folder
+    )
+
+
+@pytest.fixture(scope="module")
+def drawn(kit: SimpleNamespace) -> list[Any]:
+    pairs = zip(kit.plan.steps, kit.plan.views, strict=False)
+    return [
+        draw_step(kit.meshes, step, view, kit.joinery.voxel_mm, STEP_PIXELS) for step, view in pairs
+    ]
+
+
+def relative(poses: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.inv(poses[0]) @ poses)
+
+
+def test_steps_go_along_the_path(kit: SimpleNamespace) -> None:
+    """Each step begins and ends in the pose of the path, but for where the whole lies."""
+    moves = len(kit.motion.moves) - 1
+    assert len(kit.plan.steps) == moves
+    for row, step in enumerate(kit.plan.steps, start=1):
+        before = poses_in_mm(kit.tree, kit.joinery, kit.motion.angles_deg[row - 1])
+        after = poses_in_mm(kit.tree, kit.joinery, kit.motion.angles_deg[row])
+        assert np.allclose(relative(step.before), relative(before), atol=1e-9)
+        assert np.allclose(relative(step.after), relative(after), atol=1e-9)
+    for one, other in pairwise(kit.plan.steps):
+        assert np.array_equal(one.after, other.before)
+
+
+def test_the_heavier_side_stays(kit: SimpleNamespace) -> None:
+    volume = np.array([body.volume for body in kit.joinery.bodies])
+    for step in kit.plan.steps:
+        moving = np.isin(np.arange(len(volume)), step.moving)
+        assert volume[moving].sum() <= volume[~moving].sum() * (1 + 1e-9)
+        assert np.array_equal(step.before[~moving], step.after[~moving])
+        assert step.held not in step.moving
+
+
+def test_half_of_a_step_is_half_of_its_turn(kit: SimpleNamespace) -> None:
+    for row, step in enumerate(kit.plan.steps, start=1):
+        angles = kit.motion.angles_deg[[row - 1, row]].mean(axis=0)
+        wanted = poses_in_mm(kit.tree, kit.joinery, angles)
+        assert np.allclose(relative(turned(step, 0.5)), relative(wanted), atol=1e-9)
+
+
+def test_what_moves_is_seen(kit: SimpleNamespace, drawn: list[Any]) -> None:
+    blocks = _blocks(kit.joinery, kit.tree)
+    for step, view, picture in zip(kit.plan.steps, kit.plan.views, drawn, strict=False):
+        look = View(view.azimuth_deg, view.elevation_deg, size=(224, 168))
+        before, after = blocks.posed(step.before), blocks.posed(step.after)
+        moving = np.isin(blocks.body, step.moving)[blocks.faces[:, 0]]
+        within = np.concatenate([before, after])
+        assert visible_shares(before, blocks.faces, moving, look, within) >= LEAST_SEEN
+        # Pixels in about the colour of what moves, whatever its light.
+        image = picture.image.astype(float) + 1
+        red, green, blue = np.moveaxis(image, 2, 0)
+        coloured = (red > 2 * green) & (red > 3 * blue)
+        assert coloured.sum() > LEAST_PIXELS, step.number
+    assert MOVING[0] > 2 * MOVING[1]
+
+
+def test_the_arrow_turns_as_the_hinge_does(kit: SimpleNamespace, drawn: list[Any]) -> None:
+    for step, view, picture in zip(kit.plan.steps, kit.plan.views, drawn, strict=False):
+        height, width = picture.image.shape[:2]
+        assert (picture.arrow >= 0).all()
+        assert (picture.arrow[:, 0] < width).all()
+        assert (picture.arrow[:, 1] < height).all()
+        away = direction_frame(view.azimuth_deg, view.elevation_deg)[2]
+        towards = float(step.axis @ away)
+        if abs(towards) < 0.2:
+            continue
+        (hinge,) = project(step.point[None], picture.camera)[:, :2]
+        spokes = picture.arrow - hinge
+        # y points down: a turn that is counter-clockwise for the reader is negative here.
+        cross = spokes[:-1, 0] * spokes[1:, 1] - spokes[:-1, 1] * spokes[1:, 0]
+        assert np.sign(cross.sum()) == -np.sign(towards), step.number
+
+
+def test_the_angle_stands_inside_the_picture_and_beside_the_arrow_head(drawn: list[Any]) -> None:
+    for picture in drawn:
+        left, top, right, bottom = picture.label
+        height, width = picture.image.shape[:2]
+        assert 0 <= left < right <= width
+        assert 0 <= top < bottom <= height
+        x, y = picture.arrow[-1]
+        assert not (left < x < right and top < y < bottom)
+
+
+def words_of(pdf: Path) -> list[list[tuple[float, ...]]]:
+    """Boxes of the words of each page."""
+    if shutil.which("pdftotext") is None:
+        pytest.skip("pdftotext (poppler-utils) is not installed")
+    done = subprocess.run(
+        ["pdftotext", "-bbox", str(pdf), "-"], capture_output=True, text=True, check=True
+    )
+    pages = []
+    for page in done.stdout.split("<page ")[1:]:
+        found = re.findall(r'xMin="([\d.]+)" yMin="([\d.]+)" xMax="([\d.]+)" yMax="([\d.]+)"', page)
+        pages.append([tuple(map(float, box)) for box in found])
+    return pages
+
+
+@pytest.mark.parametrize("name", ["manual.pdf", "manual-letter.pdf"])
+def test_no_words_of_the_manual_overlap(name: str, kit: SimpleNamespace) -> None:
+    pages = words_of(kit.folder / name)
+    assert len(pages) == 3 + -(-len(kit.plan.steps) // 6)
+    wide, high = (595.3, 841.9) if name == "manual.pdf" else (612.0, 792.0)
+    for page in pages:
+        assert page
+        for box in page:
+            assert box[0] > 0
+            assert box[2] < wide
+            assert box[3] < high
+        for one, other in combinations(page, 2):
+            across = min(one[2], other[2]) - max(one[0], other[0])
+            down = min(one[3], other[3]) - max(one[1], other[1])
+            # Boxes of letters are higher than letters: lines may touch.
+            assert across < 0.5 or down < 2.5, (one, other)
+
+
+def test_the_font_is_inside(kit: SimpleNamespace) -> None:
+    if shutil.which("pdffonts") is None:
+        pytest.skip("pdffonts (poppler-utils) is not installed")
+    done = subprocess.run(
+        ["pdffonts", str(kit.folder / "manual.pdf")], capture_output=True, text=True, check=True
+    )
+    fonts = done.stdout.splitlines()[2:]
+    assert fonts
+    for line in fonts:
+        assert "DejaVu" in line
+        assert "TrueType" in line
+        assert re.search(r"Identity-H\s+yes", line), line
+
+
+def test_bambu_studio_gets_the_manual_too(kit: SimpleNamespace) -> None:
+    with zipfile.ZipFile(kit.folder / "bar-bambu.3mf") as archive:
+        manual = archive.read("Auxiliaries/Assembly Guide/manual.pdf")
+        bill = archive.read("Auxiliaries/Bill of Materials/bom.csv")
+        types = archive.read("[Content_Types].xml").decode()
+    assert manual == (kit.folder / "manual.pdf").read_bytes()
+    assert bill == (kit.folder / "bom.csv").read_bytes()
+    assert "application/pdf" in types
+
+
+def test_pages_ask_for_nothing(kit: SimpleNamespace) -> None:
+    for name in ("manual.html", "report.html", "fold.html"):
+        page = (kit.folder / name).read_text("utf-8")
+        assert "Content-Security-Policy" in page
+        assert not re.search(r"""(?:src|href)=["'](?:https?:)?//""", page), name
+        assert "{{" not in page or name == "fold.html"
+    page = (kit.folder / "fold.html").read_text("utf-8")
+    assert "Three.js Authors" in page
+    assert "SPDX-License-Identifier: MIT" in page
+    assert not re.search(r"\{\{[A-Z]+\}\}", page)
+    assert len(page) < 2_000_000
