@@ -289,6 +289,33 @@ def inspect(
     show_inspection(found, as_json=as_json)
 
 
+@app.command()
+@_guarded
+def render(
+    source: Annotated[str, typer.Argument(metavar="KIT", help="A kit folder.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Ends in .mp4, .gif or .png.")
+    ] = Path("fold.gif"),
+    size: Annotated[str, typer.Option("--size", help="Width and height in pixels.")] = "640x480",
+    quiet: Quiet = False,
+) -> None:
+    """Draw the folding of a kit as a film, a GIF, or a strip of three pictures."""
+    from fabfold.cli.console import ConsoleListener
+    from fabfold.kit.guide_files import render_kit
+    from fabfold.kit.kit import open_kit
+    from fabfold.progress import SilentListener
+
+    sides = size.lower().split("x")
+    if len(sides) != 2 or not all(s.isdecimal() and 64 <= int(s) <= 4096 for s in sides):
+        raise RecipeError(f"--size {size}: give width and height, 64 to 4096, such as 640x480")
+    listener = SilentListener() if quiet else ConsoleListener()
+    built = open_kit(source).join()
+    with listener.stage("render") as progress:
+        even = (int(sides[0]) // 2 * 2, int(sides[1]) // 2 * 2)
+        render_kit(built, output, even, progress)
+    typer.echo(output)
+
+
 @app.command("list")
 @_guarded
 def list_things(

@@ -35,6 +35,7 @@ _TITLES = {
     "join": "Making bodies and hinges",
     "check": "Checking",
     "export": "Writing the kit",
+    "render": "Drawing the fold",
 }
 _STAGES = {
     "solid": "reading",

@@ -60,6 +60,7 @@ def render(
     *,
     distance: float | None = None,
     within: NDArray[np.float64] | None = None,
+    smooth: Sequence[NDArray[np.float64]] | None = None,
 ) -> Image:
     """Draw meshes.
 
@@ -78,6 +79,9 @@ def render(
         them all by default.
     within : (n, 3) float64 array, optional
         Points that the picture is to hold besides the meshes.
+    smooth : sequence of (f, 3, 3) float64 array, optional
+        What :func:`~fabfold.export.shading.corner_normals` gives for each mesh, for those who draw
+        many pictures.
 
     Returns
     -------
@@ -94,7 +98,7 @@ def render(
     view = view or View()
     if not meshes or not sum(len(faces) for _, faces in meshes):
         raise RecipeError("a picture needs at least one triangle")
-    vertices, corners, normals, owner = _gathered(meshes, transforms)
+    vertices, corners, normals, owner = _gathered(meshes, transforms, smooth)
     samples = view.samples
     pixels = (view.size[0] * samples, view.size[1] * samples)
     held = vertices if within is None else np.concatenate([vertices, within])
@@ -127,14 +131,16 @@ def render(
 
 
 def _gathered(
-    meshes: Sequence[Mesh], transforms: NDArray[np.float64] | None
+    meshes: Sequence[Mesh],
+    transforms: NDArray[np.float64] | None,
+    known: Sequence[NDArray[np.float64]] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float32], NDArray[np.int32]]:
     """All vertices, triangles, corner normals, and the mesh that each triangle is of."""
     points, corners, normals, owner = [], [], [], []
     start = 0
     for index, (vertices, faces) in enumerate(meshes):
         turned = np.asarray(vertices, dtype=np.float64)
-        smooth = corner_normals(turned, faces)
+        smooth = corner_normals(turned, faces) if known is None else known[index]
         if transforms is not None:
             pose = np.asarray(transforms[index], dtype=float)
             turned = turned @ pose[:3, :3].T + pose[:3, 3]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fabfold.export.camera import View
 from fabfold.export.kit_picture import picture_of_kit
 from fabfold.export.render import Image, Mesh
+from fabfold.export.shading import corner_normals
 from fabfold.export.weld import printable_mesh
 from fabfold.fold.motion import Motion
 from fabfold.guide.fold_steps import FoldStep, fold_steps
@@ -173,9 +174,10 @@ def draw_manual(
     for body in joinery.bodies:
         vertices, faces = printable_mesh(body)
         meshes.append((vertices.astype(np.float64), faces))
+    smooth = [corner_normals(vertices, faces) for vertices, faces in meshes]
     drawn = []
     for step, view in zip(plan.steps, plan.views, strict=False):
-        picture = draw_step(meshes, step, view, joinery.voxel_mm, STEP_PIXELS)
+        picture = draw_step(meshes, step, view, joinery.voxel_mm, STEP_PIXELS, smooth)
         drawn.append(ManualStep(step.number, step_text(step), view.turned, picture))
         progress.update(step.number / (len(plan.steps) + 1), f"step {step.number}")
     count = len(plan.steps)

@@ -110,6 +110,7 @@ def draw_step(
     view: StepView,
     voxel_mm: float,
     size: tuple[int, int],
+    smooth: Sequence[NDArray[np.float64]] | None = None,
 ) -> StepPicture:
     """Draw a step.
 
@@ -125,6 +126,8 @@ def draw_step(
         Side of a voxel.
     size : (int, int)
         Width and height in pixels.
+    smooth : sequence of (f, 3, 3) float64 array, optional
+        Normals of the meshes, see :func:`fabfold.export.render.render`.
 
     Returns
     -------
@@ -139,7 +142,7 @@ def draw_step(
         view.azimuth_deg, view.elevation_deg, size=size, ground=False, lights=4, margin=0.05
     )
     colours = np.array([MOVING if body in step.moving else STAYING for body in every], np.uint8)
-    image = render(meshes, colours, step.before, look, within=within)
+    image = render(meshes, colours, step.before, look, within=within, smooth=smooth)
     before = _points(meshes, step.before, every)
     camera = camera_for(np.concatenate([before, within]), look, size, None)
     image = _with_ghost(image, meshes, step, camera)

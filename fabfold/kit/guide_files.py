@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fabfold.errors import RecipeError
 from fabfold.export.colours import body_colours
 from fabfold.export.kit_picture import strip
 from fabfold.export.render import png_bytes
@@ -15,9 +16,10 @@ from fabfold.guide.manual_html import manual_html
 from fabfold.guide.manual_pdf import manual_pdf
 from fabfold.kit.stages import BuiltTree
 from fabfold.printing.print_mode import PrintMode
+from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
 
-__all__ = ["write_guide"]
+__all__ = ["render_kit", "write_guide"]
 
 
 def write_guide(
@@ -78,3 +80,36 @@ def write_guide(
         "Assembly Guide/manual.pdf": paper,
         "Model Pictures/folding.png": picture,
     }
+
+
+def render_kit(built: BuiltTree, path: Path, size: tuple[int, int], progress: Progress) -> None:
+    """Draw the folding of a kit as a film, a GIF, or a strip of three pictures.
+
+    Parameters
+    ----------
+    built : BuiltTree
+        Tree, motion and printed bodies.
+    path : Path
+        File to write; its ending says what, see :data:`fabfold.guide.film.FILM_ENDINGS`.
+    size : (int, int)
+        Width and height of the film in pixels.
+    progress : Progress
+        Hears of every picture.
+
+    Raises
+    ------
+    RecipeError
+        If it cannot be written as such a file.
+    """
+    from fabfold.export.weld import printable_mesh
+    from fabfold.guide.film import FILM_ENDINGS, write_film
+
+    if path.suffix.lower() not in FILM_ENDINGS:  # Before anything is drawn.
+        endings = ", ".join(FILM_ENDINGS)
+        raise RecipeError(f"--output {path.name}: its ending must be one of {endings}")
+    tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
+    upright, colours = built.planned.voxels.rotation.T, body_colours(tree)
+    plan = plan_steps(joinery, tree, motion, upright)
+    meshes = [(v.astype(float), f) for v, f in map(printable_mesh, joinery.bodies)]
+    picture = strip(joinery, tree, motion, colours=colours, upright=upright)
+    write_film(path, meshes, colours, plan, picture, size=size, progress=progress)
