@@ -88,7 +88,7 @@ def _pictures(
                 [v @ p[:3, :3].T + p[:3, 3] for (v, _), p in zip(meshes, poses, strict=True)]
             )
             reach = max(reach, float(np.linalg.norm(np.ptp(points, axis=0))))
-    distance = 0.5 * reach / np.tan(np.radians(12.0)) * 1.05
+    distance = 0.5 * reach / np.tan(np.radians(12.0)) * 0.88
     smooth = [corner_normals(vertices, faces) for vertices, faces in meshes]
     before: tuple[FoldStep, float, float, float] | None = None
     picture: Image | None = None
