@@ -138,7 +138,8 @@ def words_of(pdf: Path) -> list[list[tuple[float, ...]]]:
 @pytest.mark.parametrize("name", ["manual.pdf", "manual-letter.pdf"])
 def test_no_words_of_the_manual_overlap(name: str, kit: SimpleNamespace) -> None:
     pages = words_of(kit.folder / name)
-    assert len(pages) == 3 + -(-len(kit.plan.steps) // 6)
+    steps = -(-len(kit.plan.steps) // 6)
+    assert 3 + steps <= len(pages) <= 4 + steps
     wide, high = (595.3, 841.9) if name == "manual.pdf" else (612.0, 792.0)
     for page in pages:
         assert page

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fabfold.export.camera import View
 from fabfold.export.kit_picture import picture_of_kit
-from fabfold.export.render import Image, Mesh
+from fabfold.export.render import Image, Mesh, render
 from fabfold.export.shading import corner_normals
 from fabfold.export.weld import printable_mesh
 from fabfold.fold.motion import Motion
@@ -27,6 +27,8 @@ __all__ = ["Manual", "ManualStep", "StepPlan", "draw_manual", "plan_steps"]
 
 #: Size of the picture of a step in pixels.
 STEP_PIXELS = (600, 450)
+#: Size of the picture of a part.
+PART_PIXELS = (200, 150)
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,10 @@ class Manual:
         The steps.
     end : (h, w, 3) uint8 array
         The closed box.
+    parts : tuple of (h, w, 3) uint8 arrays
+        Each part by itself, in the order of their numbers.
+    names : tuple of str
+        What the files call each part.
     """
 
     title: str
@@ -102,6 +108,8 @@ class Manual:
     assembly: tuple[str, ...]
     steps: tuple[ManualStep, ...]
     end: Image
+    parts: tuple[Image, ...]
+    names: tuple[str, ...]
 
 
 def plan_steps(
@@ -125,6 +133,11 @@ def plan_steps(
     stand = np.asarray(ROTATIONS[int(np.round(traces, 9).argmax())], dtype=np.float64)
     steps = fold_steps(joinery, tree, motion, stand)
     return StepPlan(stand, tuple(steps), tuple(step_views(joinery, tree, steps)))
+
+
+def _standing(meshes: Sequence[Mesh], stand: NDArray[np.float64]) -> list[Mesh]:
+    """Meshes turned as the kit lies on the table."""
+    return [(vertices @ stand.T, faces) for vertices, faces in meshes]
 
 
 def draw_manual(
@@ -180,6 +193,11 @@ def draw_manual(
         picture = draw_step(meshes, step, view, joinery.voxel_mm, STEP_PIXELS, smooth)
         drawn.append(ManualStep(step.number, step_text(step), view.turned, picture))
         progress.update(step.number / (len(plan.steps) + 1), f"step {step.number}")
+    alone = View(size=PART_PIXELS, lights=3, ground=False, margin=0.04)
+    parts = [
+        render([mesh], colours[index : index + 1], None, alone, smooth=[smooth[index]])
+        for index, mesh in enumerate(_standing(meshes, plan.stand))
+    ]
     count = len(plan.steps)
     last = plan.views[-1]
     end = View(last.azimuth_deg, last.elevation_deg, size=STEP_PIXELS, lights=12)
@@ -195,4 +213,6 @@ def draw_manual(
         end=picture_of_kit(
             joinery, tree, motion.angles_deg[-1], end, colours=colours, upright=plan.stand
         ),
+        parts=tuple(parts),
+        names=tuple(body.name for body in joinery.bodies),
     )

@@ -24,6 +24,9 @@ img { max-width: 100%; height: auto; display: block; }
 .cover { margin: 0 auto; }
 .steps { display: grid; grid-template-columns: repeat(auto-fill, minmax(19rem, 1fr)); gap: 1.6rem;
   list-style: none; padding: 0; }
+.parts { display: grid; grid-template-columns: repeat(auto-fill, minmax(8rem, 1fr)); gap: .6rem;
+  list-style: none; padding: 0; color: var(--soft); font-size: .85rem; }
+.parts b { color: var(--ink); font-size: 1.1rem; }
 .steps li { border-top: 1px solid var(--line); padding-top: .5rem; break-inside: avoid; }
 .number { font-size: 1.7rem; font-weight: 700; margin-right: .6rem; }
 .turn { color: var(--accent); font-weight: 600; }
@@ -61,6 +64,15 @@ def _step(step: ManualStep) -> str:
     )
 
 
+def _parts(manual: Manual) -> str:
+    return "".join(
+        f"<li>{_image(image, f'Part {number}')}<b>{number}</b> {escape(name)}</li>"
+        for number, (image, name) in enumerate(
+            zip(manual.parts, manual.names, strict=True), start=1
+        )
+    )
+
+
 def manual_html(manual: Manual) -> str:
     """The manual as a page with nothing outside it.
 
@@ -84,6 +96,7 @@ def manual_html(manual: Manual) -> str:
         f'<h1>{title}</h1><p class="sub">{escape(manual.subtitle)}</p>'
         f"{_image(manual.cover, 'As it is printed, half-way, and folded', 'cover')}"
         f"{_list('What is in the box', manual.contents)}{_list('Printing', manual.advice)}"
+        f'<h2>The parts</h2><ul class="parts">{_parts(manual)}</ul>'
         f"{_list('Putting it together', manual.assembly, 'ol')}"
         "<h2>Folding</h2><p>Hold what is light. Turn what is dark along the arrow, as far as the "
         "number says; the dashed outline shows where it ends. The line of dashes and dots is the "

@@ -51,6 +51,7 @@ def manual_pdf(manual: Manual, paper: str = "a4") -> bytes:
     pdf.add_font("sans", "B", font_file(bold=True))
     _cover(pdf, manual)
     _before(pdf, manual)
+    _parts(pdf, manual)
     per_page = _COLUMNS * _ROWS
     for start in range(0, len(manual.steps), per_page):
         _page(pdf, manual)
@@ -165,6 +166,35 @@ def _before(pdf: FPDF, manual: Manual) -> None:
             "one before: turn the kit in your hands until it looks the same.",
         ],
     )
+
+
+def _parts(pdf: FPDF, manual: Manual) -> None:
+    """All parts with their numbers."""
+    columns, gap = 5, 4.0
+    width = (pdf.epw - (columns - 1) * gap) / columns
+    height = 0.75 * width + 9
+    pdf.ln(4)
+    if pdf.get_y() + 12 + height > pdf.h - 16:
+        _page(pdf, manual)
+        pdf.set_xy(_MARGIN, _MARGIN)
+    _heading(pdf, "The parts")
+    top, row = pdf.get_y() + 1, 0
+    for index, image in enumerate(manual.parts):
+        column = index % columns
+        if column == 0 and index:
+            row += 1
+        if column == 0 and top + (row + 1) * height > pdf.h - 14:
+            _page(pdf, manual)
+            top, row = _MARGIN + 2, 0
+        x, y = _MARGIN + column * (width + gap), top + row * height
+        _picture(pdf, image, x, y, width, 0.75 * width)
+        pdf.set_xy(x, y + 0.75 * width)
+        _text(pdf, 11, _INK, "B")
+        number = str(index + 1)
+        pdf.cell(pdf.get_string_width(number) + 3, 5, number)
+        _text(pdf, 7, _SOFT)
+        pdf.cell(0, 5.4, manual.names[index])
+    pdf.set_xy(_MARGIN, top + (row + 1) * height)
 
 
 def _step(pdf: FPDF, step: ManualStep, place: int) -> None:

@@ -136,6 +136,10 @@ def read_ply_polygons(path: Path, single: bool) -> RawMesh:
     listed_points = [listing for name, _, listing in elements if name == "vertex"]
     if any(counted for listing in listed_points for _, counted, _ in listing):
         raise ModelError(f"{path.name}: a vertex has a list of numbers; export it again")
+    if len({len(points[axis]) for axis in "xyz"}) > 1:
+        raise ModelError(
+            f"{path.name}: its vertices have different numbers of x, y and z; export it again"
+        )
     vertices = np.stack([np.asarray(points[axis], dtype=np.float64) for axis in "xyz"], axis=1)
     faces = read.get("face", {})
     listed: Any = next((faces[name] for name in _CORNERS if name in faces), [])
