@@ -70,6 +70,12 @@ FOUND = {
         b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n\\\n\\\n\n",
         "only 3 lines follow",
     ),
+    "x named twice.ply": (
+        b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+        b"property float z\nproperty float x\nelement face 1\n"
+        b"property list uchar int vertex_indices\nend_header\n0 0 0 0\n1 0 0 0\n5 0 1 0 1 0\n",
+        "different numbers of x, y and z|names a vertex|no triangles|cannot be read",
+    ),
     "list of a vertex.ply": (
         ply_with("property list uchar float x").replace(b"4 4", b"5 4"),
         "a list of numbers|cannot be read|damaged",
@@ -98,6 +104,14 @@ def test_a_material_that_is_no_number_is_black(tmp_path: Path) -> None:
     path = tmp_path / "x.obj"
     path.write_text("mtllib x.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl dark\nf 1 2 3\n")
     assert read_mesh(path).colours.tolist() == [[0, 0, 255]]
+
+
+def test_a_vertex_of_very_many_digits_is_not_there(tmp_path: Path) -> None:
+    reader = READERS["3MF, its model"]
+    path = tmp_path / "x.3mf"
+    path.write_bytes(reader.wrap(reader.seeds[0].replace(b'v1="0"', b'v1="' + 40 * b"9" + b'"')))
+    with pytest.raises(ModelError, match="names a vertex that is not there"):
+        read_mesh(path)
 
 
 def test_settings_that_are_no_numbers_belong_to_no_part(tmp_path: Path) -> None:

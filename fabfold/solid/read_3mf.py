@@ -279,7 +279,13 @@ class _Reader:
         if address not in self._meshes:
             thing = self._at(address)
             vertices = np.array(thing.vertices, dtype=np.float64).reshape(-1, 3)
-            faces = np.array(thing.triangles, dtype=np.int64).reshape(-1, 3)
+            try:
+                faces = np.array(thing.triangles, dtype=np.int64).reshape(-1, 3)
+            except OverflowError:
+                raise ModelError(
+                    f"{self._file}: a triangle of object {address[1]} names a vertex that is not "
+                    f"there, it has {len(vertices)}; export the model again"
+                ) from None
             outside = ((faces < 0) | (faces >= len(vertices))).any(axis=1)
             if outside.any():
                 raise ModelError(
