@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 from fabfold.errors import RecipeError, system_message
 from fabfold.kit.kit import open_kit
+from fabfold.version import __version__
 
 ROOT = Path(__file__).parents[1]
 TRAP = "open('TRAPPED', 'w').write('this file was executed')\nraise SystemExit\n"
@@ -182,6 +184,14 @@ def test_a_damaged_journal_is_told(bar, bar_options, tmp_path):
     assert "note: " in result.stdout
     assert "journal.json was damaged" in result.stdout
     assert json.loads(journal.read_text("utf-8")) == json.loads(whole)
+
+
+def test_a_kit_of_another_version_is_not_used_without_a_word(bar_kit, tmp_path):
+    shutil.copytree(bar_kit.folder, tmp_path / "kit")
+    path = tmp_path / "kit" / "kit.toml"
+    path.write_text(path.read_text("utf-8").replace(f'"{__version__}"', '"0.0.9"', 1), "utf-8")
+    assert "made by fabfold 0.0.9" in open_kit(str(tmp_path / "kit")).damage
+    assert open_kit(str(bar_kit.folder)).damage == ""
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])

@@ -8,10 +8,29 @@ from typing import Any, TypeVar
 
 from fabfold.progress import Listener, Progress, SilentListener, processor_seconds
 from fabfold.store import StageStore
+from fabfold.toml_files import TomlError, read_toml
+from fabfold.version import __version__
 
 __all__ = ["StageRunner"]
 
 Result = TypeVar("Result")
+
+
+def _made_by_another(store: StageStore) -> str:
+    """A sentence about a kit that another version of this program has made; empty otherwise."""
+    if store.folder is None:
+        return ""
+    path = store.folder.parent / "kit.toml"
+    try:
+        version = read_toml(path)[0].get("fabfold", __version__) if path.is_file() else __version__
+    except (TomlError, OSError):  # Told where it is read as a recipe.
+        return ""
+    if version == __version__:
+        return ""
+    return (
+        f"{path}: made by fabfold {version}, this is {__version__}; what this one makes otherwise "
+        "is made again, and the kit may come out different"
+    )
 
 
 class StageRunner:
@@ -35,13 +54,14 @@ class StageRunner:
         self.listener: Listener = SilentListener()
         self.processor_seconds: dict[str, float] = {}
         self._store = store
+        self._stranger = _made_by_another(store)
         self._results: dict[str, Any] = {}
         self._unsaved: list[Callable[[], None]] = []
 
     @property
     def damage(self) -> str:
-        """What of the kit folder could not be read and is made again; empty where all could."""
-        return self._store.damage
+        """What of the kit folder cannot be used and is made again; empty where all can."""
+        return "; ".join(text for text in (self._store.damage, self._stranger) if text)
 
     def _accept(self) -> None:
         """Change the kit folder for what was made; called once its input is known to be good."""
