@@ -64,7 +64,9 @@ def test_step_holds_the_name_as_a_string(folder):
     assert any("X(\\X\\27\\X\\27);" in string or "X(''\\X\\27);" in string for string in strings)
     with contextlib.redirect_stdout(io.StringIO()):
         solids = build123d.import_step(folder / f"{PLAIN}.step").solids()
-    assert len(solids) == json.loads((folder / "report.json").read_text())["summary"]["bodies"]
+    assert (
+        len(solids) == json.loads((folder / "report.json").read_text("utf-8"))["summary"]["bodies"]
+    )
 
 
 class Tags(HTMLParser):

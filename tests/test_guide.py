@@ -126,7 +126,7 @@ def words_of(pdf: Path) -> list[list[tuple[float, ...]]]:
     if shutil.which("pdftotext") is None:
         pytest.skip("pdftotext (poppler-utils) is not installed")
     done = subprocess.run(
-        ["pdftotext", "-bbox", str(pdf), "-"], capture_output=True, text=True, check=True
+        ["pdftotext", "-bbox", str(pdf), "-"], capture_output=True, encoding="utf-8", check=True
     )
     pages = []
     for page in done.stdout.split("<page ")[1:]:
@@ -158,7 +158,10 @@ def test_the_font_is_inside(kit: SimpleNamespace) -> None:
     if shutil.which("pdffonts") is None:
         pytest.skip("pdffonts (poppler-utils) is not installed")
     done = subprocess.run(
-        ["pdffonts", str(kit.folder / "manual.pdf")], capture_output=True, text=True, check=True
+        ["pdffonts", str(kit.folder / "manual.pdf")],
+        capture_output=True,
+        encoding="utf-8",
+        check=True,
     )
     fonts = done.stdout.splitlines()[2:]
     assert fonts

@@ -132,7 +132,7 @@ def _next_steps(summary: Mapping[str, Any]) -> str:
     what = "plate-1.3mf" + (" and the others" if summary.get("plates", 1) > 1 else "")
     first = what if apart else f"{model}.3mf"
     lines = [
-        f"Print <b>{escape(first)}</b> as it lies, without scaling "
+        f"Print <strong>{escape(first)}</strong> as it lies, without scaling "
         f"(Bambu Studio and OrcaSlicer: {escape(str(model))}-bambu.3mf).",
         'See it fold: <a href="fold.html">fold.html</a>.',
         'Fold it by the manual: <a href="manual.pdf">manual.pdf</a>, '

@@ -26,7 +26,7 @@ img { max-width: 100%; height: auto; display: block; }
   list-style: none; padding: 0; }
 .parts { display: grid; grid-template-columns: repeat(auto-fill, minmax(8rem, 1fr)); gap: .6rem;
   list-style: none; padding: 0; color: var(--soft); font-size: .85rem; }
-.parts b { color: var(--ink); font-size: 1.1rem; }
+.parts strong { color: var(--ink); font-size: 1.1rem; }
 .steps li { border-top: 1px solid var(--line); padding-top: .5rem; break-inside: avoid; }
 .number { font-size: 1.7rem; font-weight: 700; margin-right: .6rem; }
 .turn { color: var(--accent); font-weight: 600; }
@@ -66,7 +66,7 @@ def _step(step: ManualStep) -> str:
 
 def _parts(manual: Manual) -> str:
     return "".join(
-        f"<li>{_image(image, f'Part {number}')}<b>{number}</b> {escape(name)}</li>"
+        f"<li>{_image(image, f'Part {number}')}<strong>{number}</strong> {escape(name)}</li>"
         for number, (image, name) in enumerate(
             zip(manual.parts, manual.names, strict=True), start=1
         )
