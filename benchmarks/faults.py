@@ -11,7 +11,6 @@ benchmarks/faults.md.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import os
 import random
@@ -24,6 +23,7 @@ import zipfile
 from pathlib import Path
 
 import trimesh
+from runs import digests
 
 HERE = Path(__file__).resolve().parent
 BAR = (80.0, 9.6, 9.6)
@@ -34,14 +34,6 @@ OPTIONS = ("-t", "box-2x2x2", "--effort", "quick", "-j", "2", "-q")
 
 def command(model: Path, kit: Path) -> list[str]:
     return [sys.executable, "-m", "fabfold", "export", str(model), "-o", str(kit), *OPTIONS]
-
-
-def digests(kit: Path) -> dict[str, str]:
-    return {
-        str(path.relative_to(kit)): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(kit.rglob("*"))
-        if path.is_file()
-    }
 
 
 def half_written(kit: Path) -> list[str]:

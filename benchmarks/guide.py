@@ -13,9 +13,11 @@ import time
 from pathlib import Path
 
 from fabfold.guide.manual import plan_steps
+from fabfold.guide.manual_pdf import page_count
 from fabfold.guide.step_views import step_views
 from fabfold.kit.guide_files import write_guide
 from fabfold.kit.kit import open_kit
+from fabfold.progress import SilentProgress
 
 HERE = Path(__file__).resolve().parent
 
@@ -31,10 +33,10 @@ def main() -> None:
         turns = sum(view.turned for view in plan.views)
         with tempfile.TemporaryDirectory() as folder:
             start = time.process_time()
-            write_guide(Path(folder), kit.recipe, mode, built)
+            write_guide(Path(folder), kit.recipe, mode, built, SilentProgress())
             seconds = time.process_time() - start
             sizes = {path.name: path.stat().st_size / 1e6 for path in Path(folder).iterdir()}
-            pages = (Path(folder) / "manual.pdf").read_bytes().count(b"/Type /Page\n")
+            pages = page_count((Path(folder) / "manual.pdf").read_bytes())
         rows.append(
             f"| {kit.recipe.name} | {len(tree.bodies)} | {len(motion.moves) - 1} "
             f"| {len(plan.steps)} | {turns} | {pages} | {sizes['manual.pdf']:.2f} "

@@ -7,6 +7,7 @@ afterwards. A run is one JSON file; what is there is not run again.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import platform
@@ -88,6 +89,15 @@ def machine_line(facts: dict[str, Any]) -> str:
     """The same in one line."""
     packages = ", ".join(f"{name} {version}" for name, version in facts["packages"].items())
     return f"{facts['cores']} cores of {facts['cpu']}, Python {facts['python']}, {packages}"
+
+
+def digests(kit: Path) -> dict[str, str]:
+    """SHA-256 of every file of a kit, those of its stages too, by name."""
+    return {
+        str(path.relative_to(kit)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(kit.rglob("*"))
+        if path.is_file()
+    }
 
 
 def write(path: Path, data: Any) -> None:

@@ -11,7 +11,6 @@ Ends with 1 where bytes differ. Without ``--quick`` writes benchmarks/same_bytes
 
 from __future__ import annotations
 
-import hashlib
 import os
 import subprocess
 import sys
@@ -19,6 +18,7 @@ import tempfile
 from pathlib import Path
 
 import trimesh
+from runs import digests
 
 HERE = Path(__file__).resolve().parent
 #: What may not matter: name, environment, workers, whether the folder is another.
@@ -83,14 +83,6 @@ def start(
         env=variables,
     )
     return kit, run
-
-
-def digests(kit: Path) -> dict[str, str]:
-    return {
-        str(path.relative_to(kit)): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(kit.rglob("*"))
-        if path.is_file()
-    }
 
 
 def differing(one: dict[str, str], other: dict[str, str]) -> list[str]:

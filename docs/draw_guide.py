@@ -15,7 +15,6 @@ import numpy as np
 
 from fabfold.export.render import png_bytes
 from fabfold.export.shading import corner_normals
-from fabfold.export.weld import printable_mesh
 from fabfold.files import write_bytes
 from fabfold.guide.manual import STEP_PIXELS, plan_steps
 from fabfold.guide.step_drawing import draw_step
@@ -51,7 +50,7 @@ def main() -> None:
     built = kit.join()
     joinery, tree, motion = built.joinery, built.planned.tree, built.planned.motion
     plan = plan_steps(joinery, tree, motion, built.planned.voxels.rotation.T)
-    meshes = [(v.astype(float), f) for v, f in map(printable_mesh, joinery.bodies)]
+    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     smooth = [corner_normals(v, f) for v, f in meshes]
     steps = list(zip(plan.steps, plan.views, strict=False))
     shown = [steps[0], *[pair for pair in steps[1:] if pair[1].turned][:1], steps[-1]]

@@ -38,6 +38,28 @@ class SilentProgress:
         """Do nothing."""
 
 
+class ProgressPart:
+    """Progress of a part of something, told as a stretch of the whole.
+
+    Parameters
+    ----------
+    whole : Progress
+        Hears of it.
+    start, end : float
+        Where in the whole the part lies, 0 to 1.
+    """
+
+    def __init__(self, whole: Progress, start: float, end: float) -> None:
+        self._whole = whole
+        self._start, self._end = start, end
+
+    def update(self, share: float | None, message: str = "") -> None:
+        """Tell how much of the part is done; None where that is not known."""
+        if share is not None:
+            share = self._start + share * (self._end - self._start)
+        self._whole.update(share, message)
+
+
 class Listener(Protocol):
     """Hears of each stage as it runs."""
 

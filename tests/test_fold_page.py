@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fabfold.export.glb import pivots_mm
 from fabfold.guide.fold_steps import turned
 from fabfold.guide.manual import plan_steps
 
@@ -60,10 +61,7 @@ def test_bodies_are_where_the_path_has_them(page: Any, bar_kit: Any) -> None:
     built = bar_kit.join()
     joinery, tree = built.joinery, built.planned.tree
     plan = plan_steps(joinery, tree, built.planned.motion, built.planned.voxels.rotation.T)
-    pivots = np.zeros((len(tree.bodies), 3))
-    pivots[0] = joinery.origin_mm
-    for hinge in tree.hinges:
-        pivots[hinge.child] = np.add(joinery.origin_mm, joinery.voxel_mm * np.asarray(hinge.point))
+    pivots = pivots_mm(joinery, tree)
     for index, step in enumerate(plan.steps):
         for share in (0.0, 0.4, 0.999):
             page.evaluate("time => fold.show(time)", index + share)

@@ -74,11 +74,11 @@ FOUND = {
         b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
         b"property float z\nproperty float x\nelement face 1\n"
         b"property list uchar int vertex_indices\nend_header\n0 0 0 0\n1 0 0 0\n5 0 1 0 1 0\n",
-        "different numbers of x, y and z|names a vertex|no triangles|cannot be read",
+        "different numbers of x, y and z",
     ),
     "list of a vertex.ply": (
         ply_with("property list uchar float x").replace(b"4 4", b"5 4"),
-        "a list of numbers|cannot be read|damaged",
+        "Vertices were not",
     ),
 }
 

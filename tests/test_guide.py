@@ -15,11 +15,10 @@ import numpy as np
 import pytest
 
 from fabfold.export.camera import View, direction_frame, project
-from fabfold.export.weld import printable_mesh
 from fabfold.guide.fold_steps import turned
 from fabfold.guide.manual import STEP_PIXELS, plan_steps
 from fabfold.guide.step_drawing import MOVING, draw_step
-from fabfold.guide.step_views import _blocks, visible_shares
+from fabfold.guide.step_views import _blocks, visible_share
 from fabfold.joinery.body_poses import poses_in_mm
 
 #: Least share of what moves that must be seen at the start of a step, and pixels that it covers.
@@ -31,7 +30,7 @@ def kit(bar_kit: Any) -> SimpleNamespace:
     built = bar_kit.join()
     joinery, tree, motion = built.joinery, built.planned.tree, built.planned.motion
     plan = plan_steps(joinery, tree, motion, built.planned.voxels.rotation.T)
-    meshes = [(v.astype(float), f) for v, f in map(printable_mesh, joinery.bodies)]
+    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     return SimpleNamespace(
         joinery=joinery, tree=tree, motion=motion, plan=plan, meshes=meshes, folder=bar_kit.folder
     )
@@ -85,7 +84,7 @@ def test_what_moves_is_seen(kit: SimpleNamespace, drawn: list[Any]) -> None:
         before, after = blocks.posed(step.before), blocks.posed(step.after)
         moving = np.isin(blocks.body, step.moving)[blocks.faces[:, 0]]
         within = np.concatenate([before, after])
-        assert visible_shares(before, blocks.faces, moving, look, within) >= LEAST_SEEN
+        assert visible_share(before, blocks.faces, moving, look, within) >= LEAST_SEEN
         # Pixels in about the colour of what moves, whatever its light.
         image = picture.image.astype(float) + 1
         red, green, blue = np.moveaxis(image, 2, 0)

@@ -48,6 +48,11 @@ _STAGES = {
 }
 
 
+def _console(*, soft_wrap: bool = False) -> Console:
+    """A console that shows brackets as they are: names of files may hold some."""
+    return Console(highlight=False, markup=False, soft_wrap=soft_wrap)
+
+
 class ConsoleListener:
     """Shows a bar a stage on a terminal, and a line a stage elsewhere; stages may be nested."""
 
@@ -126,7 +131,7 @@ class _LastMessage:
 
 def show_result(kit: Kit, stage: str, checks: Sequence[Check] = ()) -> None:
     """Print what `stage` found, with its checks, and where its files are."""
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = _console(soft_wrap=True)
     for line in _result_lines(kit, stage, checks):
         console.print(harmless(line))
     # Not part of the kit, whose files are the same on every machine.
@@ -204,7 +209,7 @@ def show_checks(checks: Sequence[Check], about: Mapping[str, str], *, as_json: b
         mark = "" if check.limit is None else "ok" if check.ok else "FAILED"
         note = harmless(check.note)
         table.add_row(mark, check.name, f"{check.figure:.4g} {check.unit}", limit, note)
-    console = Console(highlight=False, markup=False)
+    console = _console()
     console.print(table)
     passed = sum(check.ok for check in checks)
     which = harmless(", ".join(about.values()))
@@ -233,7 +238,7 @@ def show_inspection(found: Inspection, *, as_json: bool) -> None:
         lines["objects"] = ", ".join(
             f"{number}: {name}" for number, name in enumerate(found.objects, start=1)
         )
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = _console(soft_wrap=True)
     for name, text in lines.items():
         console.print(harmless(f"{name:8} {text}"))
     for note in found.notes:
@@ -244,7 +249,7 @@ def show_inspection(found: Inspection, *, as_json: bool) -> None:
 
 def show_pareto(kit: Kit) -> None:
     """Print the Pareto list of a kit as a table, and where its pictures are."""
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = _console(soft_wrap=True)
     found = kit.pareto()
     table = Table("pick", "joints", "surface", "bodies", "moves", "preference", box=None)
     kept = any(solution.kept is not None for solution in found)

@@ -30,7 +30,7 @@ from fabfold.joinery.bodies import Joinery
 from fabfold.srgb import linear_light
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["SECONDS_PER_QUARTER", "glb_bytes", "keyframe_times", "write_glb"]
+__all__ = ["SECONDS_PER_QUARTER", "glb_bytes", "keyframe_times", "pivots_mm", "write_glb"]
 
 #: How long a turn of 90 degrees takes.
 SECONDS_PER_QUARTER = 0.6
@@ -248,8 +248,21 @@ def glb_bytes(
     )
 
 
-def _pivots_mm(joinery: Joinery, tree: FoldTree) -> NDArray[np.float64]:
-    """Origin (b, 3) of each body's node in mm, shape A: its hinge, or the root's own voxels."""
+def pivots_mm(joinery: Joinery, tree: FoldTree) -> NDArray[np.float64]:
+    """Where the nodes of an animation stand: each body at its hinge, the root amid its own voxels.
+
+    Parameters
+    ----------
+    joinery : Joinery
+        It tells the voxel's side and the origin.
+    tree : FoldTree
+        The bodies and hinges.
+
+    Returns
+    -------
+    (b, 3) float64 array
+        In shape A, mm.
+    """
     origin = np.asarray(joinery.origin_mm, dtype=float)
     pivots = np.zeros((len(tree.bodies), 3))
     pivots[0] = origin + joinery.voxel_mm * tree.source[list(tree.bodies[0].voxels)].mean(axis=0)
@@ -265,7 +278,7 @@ def _scene(
 
     Node 0 is the kit; body ``i`` is node ``i + 1``, mesh ``i`` and material ``i``.
     """
-    pivots = _pivots_mm(joinery, tree)
+    pivots = pivots_mm(joinery, tree)
     everything = np.concatenate([body.vertices for body in joinery.bodies])
     low, high = everything.min(axis=0), everything.max(axis=0)
     stand = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fabfold.export.camera import View, camera_for, project
 from fabfold.export.colours import body_colours
-from fabfold.export.render import Image, png_bytes, render
+from fabfold.export.render import Image, png_bytes, posed_points, render
 from fabfold.files import write_bytes
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
@@ -18,7 +18,7 @@ from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.lattice.rotations import ROTATIONS
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["halfway", "picture_of_kit", "strip", "write_strip"]
+__all__ = ["halfway", "nearest_lattice", "picture_of_kit", "strip", "write_strip"]
 
 
 def _poses_mm(
@@ -107,8 +107,19 @@ def halfway(motion: Motion) -> NDArray[np.float64]:
     )
 
 
-def _nearest_lattice(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The lattice rotation that turns least from a rotation."""
+def nearest_lattice(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The lattice rotation that turns least from a rotation.
+
+    Parameters
+    ----------
+    rotation : (3, 3) float64 array
+        Any rotation.
+
+    Returns
+    -------
+    (3, 3) float64 array
+        One of the 24 that take the lattice onto itself.
+    """
     traces = np.einsum("rij,ij->r", ROTATIONS, rotation)
     return np.asarray(ROTATIONS[int(np.round(traces, 9).argmax())], dtype=np.float64)
 
@@ -166,21 +177,14 @@ def strip(
         The picture, sRGB.
     """
     view = view or View(size=(560, 560))
-    stand = None if upright is None else _nearest_lattice(upright)
+    stand = None if upright is None else nearest_lattice(upright)
     states = [(motion.angles_deg[0], upright), (motion.angles_deg[-1], stand)]
     if between:
         states.insert(1, (halfway(motion), stand))
-    clouds = []
-    for angles, turn in states:
-        poses = _poses_mm(joinery, tree, angles, turn)
-        clouds.append(
-            np.concatenate(
-                [
-                    body.vertices @ pose[:3, :3].T + pose[:3, 3]
-                    for body, pose in zip(joinery.bodies, poses, strict=True)
-                ]
-            )
-        )
+    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
+    clouds = [
+        posed_points(meshes, _poses_mm(joinery, tree, angles, turn)) for angles, turn in states
+    ]
     distance = max(_reach(cloud, view) for cloud in clouds)
     pictures = []
     for (angles, turn), cloud in zip(states, clouds, strict=True):

@@ -19,7 +19,7 @@ from fabfold.export.lighting import ShadowFloor, light_at, sun_frame
 from fabfold.export.shading import corner_normals
 from fabfold.srgb import bytes_of_light, linear_light
 
-__all__ = ["Image", "Mesh", "png_bytes", "render", "thumbnail"]
+__all__ = ["Image", "Mesh", "jpeg_bytes", "png_bytes", "posed_points", "render", "thumbnail"]
 
 #: A picture, (height, width, 3) uint8 array, sRGB.
 Image = NDArray[np.uint8]
@@ -179,6 +179,29 @@ def _painted(
     return np.asarray(np.where(lit > 0.8, 0.8 + 0.2 * np.tanh((lit - 0.8) / 0.2), lit))
 
 
+def posed_points(meshes: Sequence[Mesh], transforms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vertices of meshes where their transforms put them, one mesh after another.
+
+    Parameters
+    ----------
+    meshes : sequence of ((v, 3) float array, (f, 3) int32 array)
+        Vertices and triangles of each mesh.
+    transforms : (b, 4, 4) float64 array
+        Rigid transform of each mesh.
+
+    Returns
+    -------
+    (n, 3) float64 array
+        In the unit of the meshes.
+    """
+    return np.concatenate(
+        [
+            vertices @ pose[:3, :3].T + pose[:3, 3]
+            for (vertices, _), pose in zip(meshes, transforms, strict=True)
+        ]
+    )
+
+
 def thumbnail(meshes: Sequence[Mesh], colours: NDArray[np.uint8]) -> bytes:
     """A small picture for file managers and slicers, as PNG.
 
@@ -218,4 +241,24 @@ def png_bytes(image: Image) -> bytes:
     about.add(b"sRGB", b"\0")
     buffer = io.BytesIO()
     PillowImage.fromarray(image).save(buffer, "PNG", pnginfo=about)
+    return buffer.getvalue()
+
+
+def jpeg_bytes(image: Image) -> bytes:
+    """An RGB picture as JPEG, the same bytes for the same picture.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8 array
+        sRGB.
+
+    Returns
+    -------
+    bytes
+        A few times smaller than as PNG, for pages with many pictures.
+    """
+    from PIL import Image as PillowImage
+
+    buffer = io.BytesIO()
+    PillowImage.fromarray(image).save(buffer, "JPEG", quality=88, subsampling=0)
     return buffer.getvalue()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fabfold.guide.wording import listed
+from fabfold.guide.wording import listed, part_number
 from fabfold.joinery.bodies import Joinery
 from fabfold.printing.print_mode import PINS, PrintMode
 from fabfold.tree.fold_tree import FoldTree
@@ -20,10 +20,6 @@ WAY_BACK = (
     "To unfold the box, follow the steps from the last to the first, and turn each arrow round. "
     "Never force a hinge: if it does not turn, the step before it is not done to its end."
 )
-
-
-def _part(body: int) -> str:
-    return str(body + 1)
 
 
 def content_lines(
@@ -111,10 +107,10 @@ def assembly_lines(joinery: Joinery, kit: ApartKit | None) -> list[str]:
     lines = []
     for step in kit.steps:
         pin = joinery.pins[step.pin]
-        rests = listed([_part(body) for body in step.sides[0]])
-        comes = listed([_part(body) for body in step.sides[1]])
+        rests = listed([part_number(body) for body in step.sides[0]])
+        comes = listed([part_number(body) for body in step.sides[1]])
         lines.append(
             f"Bring {comes} to {rests}, and push in a pin of {pin.length_mm:.1f} mm "
-            f"until it stands in part {_part(pin.owner)}."
+            f"until it stands in part {part_number(pin.owner)}."
         )
     return lines

@@ -1,4 +1,4 @@
-"""The fold as a film, a moving picture or a strip of pictures, drawn without a display."""
+"""The fold as a film or as a moving picture, drawn without a display."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from fabfold.errors import RecipeError
 from fabfold.export.camera import View
-from fabfold.export.render import Image, Mesh, png_bytes, render
+from fabfold.export.render import Image, Mesh, posed_points, render
 from fabfold.export.shading import corner_normals
-from fabfold.files import replacing, write_bytes
+from fabfold.files import replacing
 from fabfold.guide.fold_steps import FoldStep, turned
 from fabfold.guide.manual import StepPlan
 from fabfold.progress import Progress, SilentProgress
@@ -20,9 +20,9 @@ from fabfold.progress import Progress, SilentProgress
 __all__ = ["FILM_ENDINGS", "film_frames", "write_film"]
 
 #: What a film can be written as.
-FILM_ENDINGS = (".mp4", ".gif", ".png")
+FILM_ENDINGS = (".mp4", ".gif")
 #: Pictures a second, of a film and of a GIF.
-_RATES = {".mp4": 24, ".gif": 12, ".png": 1}
+_RATES = {".mp4": 24, ".gif": 12}
 #: Seconds that a quarter turn takes, that the camera takes to go round, and rests at the ends.
 _QUARTER, _ROUND, _REST = 0.7, 0.5, 1.2
 
@@ -84,10 +84,8 @@ def _pictures(
     reach = 0.0
     for step in {frame[0].number: frame[0] for frame in frames}.values():
         for poses in (step.before, step.after):
-            points = np.concatenate(
-                [v @ p[:3, :3].T + p[:3, 3] for (v, _), p in zip(meshes, poses, strict=True)]
-            )
-            reach = max(reach, float(np.linalg.norm(np.ptp(points, axis=0))))
+            spread = np.ptp(posed_points(meshes, poses), axis=0)
+            reach = max(reach, float(np.linalg.norm(spread)))
     distance = 0.5 * reach / np.tan(np.radians(12.0)) * 0.88
     smooth = [corner_normals(vertices, faces) for vertices, faces in meshes]
     before: tuple[FoldStep, float, float, float] | None = None
@@ -109,7 +107,6 @@ def write_film(
     meshes: Sequence[Mesh],
     colours: NDArray[np.uint8],
     plan: StepPlan,
-    strip: Image,
     *,
     size: tuple[int, int] = (640, 480),
     progress: Progress | None = None,
@@ -119,15 +116,13 @@ def write_film(
     Parameters
     ----------
     path : Path
-        File to write, with one of the endings :data:`FILM_ENDINGS`; ``.png`` is the strip.
+        File to write, with one of the endings :data:`FILM_ENDINGS`.
     meshes : sequence of (vertices, faces)
         Bodies in shape A, mm.
     colours : (b, 3) uint8 array
         Colour of each body, sRGB.
     plan : StepPlan
         Steps and views.
-    strip : (h, w, 3) uint8 array
-        A, half-way and B, for a PNG.
     size : (int, int)
         Width and height of the film in pixels, both even.
     progress : Progress, optional
@@ -136,22 +131,17 @@ def write_film(
     Raises
     ------
     RecipeError
-        If it cannot be written as such a file, or imageio-ffmpeg is not installed for a film.
+        If imageio-ffmpeg is not installed, which an MP4 needs.
     """
     ending = path.suffix.lower()
-    if ending not in FILM_ENDINGS:
-        raise RecipeError(
-            f"{path.name}: a film is written as {', '.join(e[1:] for e in FILM_ENDINGS)}; "
-            "give --output a name with one of these endings"
-        )
-    if ending == ".png":
-        write_bytes(path, png_bytes(strip))
-        return
     rate = _RATES[ending]
     frames = film_frames(plan, rate)
     pictures = _pictures(meshes, colours, frames, size, progress or SilentProgress())
     with replacing(path) as temporary:
-        (_write_mp4 if ending == ".mp4" else _write_gif)(temporary, pictures, size, rate)
+        if ending == ".mp4":
+            _write_mp4(temporary, pictures, size, rate)
+        else:
+            _write_gif(temporary, pictures, rate)
 
 
 def _write_mp4(path: Path, pictures: Iterator[Image], size: tuple[int, int], rate: int) -> None:
@@ -177,7 +167,7 @@ def _write_mp4(path: Path, pictures: Iterator[Image], size: tuple[int, int], rat
     writer.close()
 
 
-def _write_gif(path: Path, pictures: Iterator[Image], _size: tuple[int, int], rate: int) -> None:
+def _write_gif(path: Path, pictures: Iterator[Image], rate: int) -> None:
     from PIL import Image as PillowImage
 
     drawn = [PillowImage.fromarray(picture) for picture in pictures]

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
+from fabfold.export.glb import pivots_mm
 from fabfold.export.shading import split_vertices
 from fabfold.export.weld import printable_mesh
 from fabfold.fold.motion import Motion
@@ -116,16 +117,11 @@ def fold_page(
     str
         HTML, the same for the same input.
     """
-    origin = np.asarray(joinery.origin_mm, dtype=float)
-    pivots = np.zeros((len(tree.bodies), 3))
-    pivots[0] = origin
-    hinge_of = np.full(len(tree.bodies), -1)
-    for column, hinge in enumerate(tree.hinges):
-        hinge_of[hinge.child] = column
-        pivots[hinge.child] = origin + joinery.voxel_mm * np.asarray(hinge.point)
+    pivots = pivots_mm(joinery, tree)
+    hinge_of = {hinge.child: column for column, hinge in enumerate(tree.hinges)}
     entries, data = _packed(joinery, pivots)
     for index, entry in enumerate(entries):
-        column = int(hinge_of[index])
+        column = hinge_of.get(index, -1)
         parent = -1 if column < 0 else tree.hinges[column].parent
         offset = pivots[index] - (pivots[parent] if parent >= 0 else 0.0)
         entry |= {

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.fold.motion import Motion
+from fabfold.joinery.barrel_sweeps import descendants
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.body_poses import poses_in_mm
+from fabfold.lattice.rotations import rotation_about
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["FoldStep", "fold_steps", "part_names", "turned"]
+__all__ = ["FoldStep", "fold_steps", "turned"]
 
 
 @dataclass(frozen=True)
@@ -51,11 +53,6 @@ class FoldStep:
     after: NDArray[np.float64]
 
 
-def part_names(count: int) -> list[str]:
-    """Names that a manual calls bodies by: 1, 2, ... as they are numbered from the root."""
-    return [str(index + 1) for index in range(count)]
-
-
 def turned(step: FoldStep, share: float) -> NDArray[np.float64]:
     """Where all bodies are when a share of a step is done.
 
@@ -71,33 +68,10 @@ def turned(step: FoldStep, share: float) -> NDArray[np.float64]:
     (b, 4, 4) float64 array
         Poses from shape A, mm.
     """
-    turn = _rotation(step.point, step.axis, np.radians(share * step.degrees))
+    turn = rotation_about(step.point, step.axis, share * step.degrees)
     poses = step.before.copy()
     poses[list(step.moving)] = turn @ poses[list(step.moving)]
     return np.asarray(poses)
-
-
-def _rotation(
-    point: NDArray[np.float64], axis: NDArray[np.float64], angle: float
-) -> NDArray[np.float64]:
-    """Right-handed turn about a line (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    pose = np.eye(4)
-    pose[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-    pose[:3, 3] = point - pose[:3, :3] @ point
-    return pose
-
-
-def _below(tree: FoldTree, hinge: int) -> list[int]:
-    """Bodies on the child's side of a hinge."""
-    found = {tree.hinges[hinge].child}
-    grown = True
-    while grown:
-        more = {h.child for h in tree.hinges if h.parent in found} - found
-        found |= more
-        grown = bool(more)
-    return sorted(found)
 
 
 def fold_steps(
@@ -128,6 +102,7 @@ def fold_steps(
     poses = whole @ poses_in_mm(tree, joinery, motion.angles_deg[0])
     angles = motion.angles_deg[0].copy()
     origin = np.asarray(joinery.origin_mm, dtype=float)
+    carries = descendants(tree)
     steps: list[FoldStep] = []
     for row, columns in enumerate(motion.moves):
         for column in columns:
@@ -139,13 +114,12 @@ def fold_steps(
             point = parent[:3, :3] @ (origin + joinery.voxel_mm * np.asarray(hinge.point))
             point = point + parent[:3, 3]
             axis = parent[:3, :3] @ np.asarray(hinge.direction, dtype=float)
-            below = _below(tree, column)
-            others = sorted(set(range(len(tree.bodies))) - set(below))
-            moving, held, sign = below, hinge.parent, np.sign(turn)
-            if volume[below].sum() > volume[others].sum():
-                moving, held, sign = others, hinge.child, -np.sign(turn)
+            carried, held, sign = carries[column], hinge.parent, np.sign(turn)
+            if volume[carried].sum() > volume[~carried].sum():
+                carried, held, sign = ~carried, hinge.child, -np.sign(turn)
+            moving = tuple(np.flatnonzero(carried).tolist())
             step = FoldStep(
-                *(len(steps) + 1, column, abs(turn), turn, tuple(moving), held),
+                *(len(steps) + 1, column, abs(turn), turn, moving, held),
                 *(point, sign * axis, poses, poses),
             )
             poses = turned(step, 1.0)

@@ -9,17 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.export.camera import View
-from fabfold.export.kit_picture import picture_of_kit
-from fabfold.export.render import Image, Mesh, render
+from fabfold.export.kit_picture import nearest_lattice, picture_of_kit
+from fabfold.export.render import Image, render
 from fabfold.export.shading import corner_normals
-from fabfold.export.weld import printable_mesh
 from fabfold.fold.motion import Motion
 from fabfold.guide.fold_steps import FoldStep, fold_steps
 from fabfold.guide.step_drawing import StepPicture, draw_step
 from fabfold.guide.step_views import StepView, step_views
 from fabfold.guide.wording import step_text
 from fabfold.joinery.bodies import Joinery
-from fabfold.lattice.rotations import ROTATIONS
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.fold_tree import FoldTree
 
@@ -58,8 +56,8 @@ class ManualStep:
     ----------
     number : int
         From 1.
-    text : str
-        How far, and which parts.
+    text, brief : str
+        How far, and which parts; and only how many parts.
     turned : bool
         Whether the whole is turned before it.
     picture : StepPicture
@@ -68,6 +66,7 @@ class ManualStep:
 
     number: int
     text: str
+    brief: str
     turned: bool
     picture: StepPicture
 
@@ -129,15 +128,9 @@ def plan_steps(
         Rotation from shape A's axes to the model's own; the nearest of the lattice is taken, so
         that the box stands straight.
     """
-    traces = np.einsum("rij,ij->r", ROTATIONS, upright)
-    stand = np.asarray(ROTATIONS[int(np.round(traces, 9).argmax())], dtype=np.float64)
+    stand = nearest_lattice(upright)
     steps = fold_steps(joinery, tree, motion, stand)
     return StepPlan(stand, tuple(steps), tuple(step_views(joinery, tree, steps)))
-
-
-def _standing(meshes: Sequence[Mesh], stand: NDArray[np.float64]) -> list[Mesh]:
-    """Meshes turned as the kit lies on the table."""
-    return [(vertices @ stand.T, faces) for vertices, faces in meshes]
 
 
 def draw_manual(
@@ -183,20 +176,20 @@ def draw_manual(
         To be laid out by :mod:`fabfold.guide.manual_pdf` or :mod:`fabfold.guide.manual_html`.
     """
     progress = progress or SilentProgress()
-    meshes: list[Mesh] = []
-    for body in joinery.bodies:
-        vertices, faces = printable_mesh(body)
-        meshes.append((vertices.astype(np.float64), faces))
+    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     smooth = [corner_normals(vertices, faces) for vertices, faces in meshes]
     drawn = []
     for step, view in zip(plan.steps, plan.views, strict=False):
         picture = draw_step(meshes, step, view, joinery.voxel_mm, STEP_PIXELS, smooth)
-        drawn.append(ManualStep(step.number, step_text(step), view.turned, picture))
+        words = step_text(step), step_text(step, brief=True)
+        drawn.append(ManualStep(step.number, *words, view.turned, picture))
         progress.update(step.number / (len(plan.steps) + 1), f"step {step.number}")
+    lying = np.eye(4)[None].copy()
+    lying[0, :3, :3] = plan.stand
     alone = View(size=PART_PIXELS, lights=3, ground=False, margin=0.04)
     parts = [
-        render([mesh], colours[index : index + 1], None, alone, smooth=[smooth[index]])
-        for index, mesh in enumerate(_standing(meshes, plan.stand))
+        render([mesh], colours[index : index + 1], lying, alone, smooth=[smooth[index]])
+        for index, mesh in enumerate(meshes)
     ]
     count = len(plan.steps)
     last = plan.views[-1]

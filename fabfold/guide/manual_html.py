@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import base64
-import io
 from collections.abc import Sequence
 from html import escape
 
-from fabfold.export.render import Image
+from fabfold.export.render import Image, jpeg_bytes
 from fabfold.guide.advice import WAY_BACK
 from fabfold.guide.manual import Manual, ManualStep
 
@@ -36,11 +35,7 @@ img { max-width: 100%; height: auto; display: block; }
 
 
 def _image(image: Image, alt: str, css: str = "") -> str:
-    from PIL import Image as PillowImage
-
-    stream = io.BytesIO()
-    PillowImage.fromarray(image).save(stream, "JPEG", quality=86)
-    data = base64.b64encode(stream.getvalue()).decode("ascii")
+    data = base64.b64encode(jpeg_bytes(image)).decode("ascii")
     height, width = image.shape[:2]
     return (
         f'<img class="{css}" width="{width}" height="{height}" alt="{escape(alt)}" '

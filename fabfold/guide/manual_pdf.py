@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Final
 
-from fabfold.export.render import Image
+from fabfold.export.render import Image, jpeg_bytes
 from fabfold.guide.advice import WAY_BACK
 from fabfold.guide.fonts import font_file
 from fabfold.guide.manual import Manual, ManualStep
@@ -15,7 +15,7 @@ from fabfold.guide.manual import Manual, ManualStep
 if TYPE_CHECKING:
     from fpdf import FPDF
 
-__all__ = ["PAPERS", "manual_pdf"]
+__all__ = ["PAPERS", "manual_pdf", "page_count"]
 
 #: Papers: name for fpdf2, width and height in mm.
 PAPERS: Final = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
@@ -61,15 +61,6 @@ def manual_pdf(manual: Manual, paper: str = "a4") -> bytes:
     return bytes(pdf.output())
 
 
-def _jpeg(image: Image) -> io.BytesIO:
-    from PIL import Image as PillowImage
-
-    stream = io.BytesIO()
-    PillowImage.fromarray(image).save(stream, "JPEG", quality=88, subsampling=0)
-    stream.seek(0)
-    return stream
-
-
 def _text(pdf: FPDF, size: float, colour: Sequence[int] = _INK, style: str = "") -> None:
     pdf.set_font("sans", style, size)
     pdf.set_text_color(*colour)
@@ -89,7 +80,7 @@ def _picture(pdf: FPDF, image: Image, x: float, y: float, width: float, height: 
     tall, wide = image.shape[:2]
     scale = min(width / wide, height / tall)
     w, h = wide * scale, tall * scale
-    pdf.image(_jpeg(image), x + (width - w) / 2, y, w, h)
+    pdf.image(io.BytesIO(jpeg_bytes(image)), x + (width - w) / 2, y, w, h)
     return float(y + h)
 
 
@@ -219,14 +210,8 @@ def _step(pdf: FPDF, step: ManualStep, place: int) -> None:
     pdf.set_xy(x, min(below, y + 11 + room) + 0.5)
     _text(pdf, 9, _SOFT)
     lines = pdf.multi_cell(width, 4.4, step.text, dry_run=True, output="LINES")
-    text = step.text if len(lines) <= 2 else _shorter(step)
+    text = step.text if len(lines) <= 2 else step.brief
     pdf.multi_cell(width, 4.4, text, align="L")
-
-
-def _shorter(step: ManualStep) -> str:
-    """The text without the list of parts, which the picture shows anyway."""
-    head, _, parts = step.text.partition(":")
-    return f"{head}: {parts.count(',') + 2} parts together"
 
 
 def _turn_mark(pdf: FPDF, x: float, y: float) -> None:
@@ -257,5 +242,5 @@ def _end(pdf: FPDF, manual: Manual) -> None:
 
 
 def page_count(content: bytes) -> int:
-    """Pages of a PDF of ours."""
+    """Pages of a PDF that :func:`manual_pdf` has made."""
     return content.count(b"/Type /Page\n")

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.export.camera import PinholeCamera, View, camera_for, project
-from fabfold.export.render import Image, Mesh, render
+from fabfold.export.render import Image, Mesh, posed_points, render
 from fabfold.guide.fold_steps import FoldStep, turned
 from fabfold.guide.fonts import font_file
 from fabfold.guide.step_views import StepView
@@ -75,7 +75,8 @@ def arrow_points(
     (count, 3) float64 array
         From where it is to where it goes.
     """
-    points = _points(meshes, step.before, step.moving)
+    moving = list(step.moving)
+    points = posed_points([meshes[body] for body in moving], step.before[moving])
     # The part of it that is near the hinge: there the hand takes hold, and the arrow begins.
     near = points[np.linalg.norm(points - step.point, axis=1) < 2.5 * voxel_mm]
     middle = (near if len(near) else points).mean(axis=0)
@@ -94,14 +95,6 @@ def arrow_points(
     local = back[:3, :3] @ start + back[:3, 3]
     poses = [turned(step, float(share))[body] for share in shares]
     return np.array([pose[:3, :3] @ local + pose[:3, 3] for pose in poses])
-
-
-def _points(
-    meshes: Sequence[Mesh], poses: NDArray[np.float64], bodies: Sequence[int]
-) -> NDArray[np.float64]:
-    return np.concatenate(
-        [meshes[body][0] @ poses[body][:3, :3].T + poses[body][:3, 3] for body in bodies]
-    )
 
 
 def draw_step(
@@ -134,16 +127,17 @@ def draw_step(
     StepPicture
         The picture, and where its arrow and label are.
     """
-    every = range(len(meshes))
     arc = arrow_points(step, meshes, voxel_mm)
-    after = _points(meshes, step.after, every)
+    after = posed_points(meshes, step.after)
     within = np.concatenate([after, arc])
     look = View(
         view.azimuth_deg, view.elevation_deg, size=size, ground=False, lights=4, margin=0.05
     )
-    colours = np.array([MOVING if body in step.moving else STAYING for body in every], np.uint8)
+    colours = np.array(
+        [MOVING if body in step.moving else STAYING for body in range(len(meshes))], np.uint8
+    )
     image = render(meshes, colours, step.before, look, within=within, smooth=smooth)
-    before = _points(meshes, step.before, every)
+    before = posed_points(meshes, step.before)
     camera = camera_for(np.concatenate([before, within]), look, size, None)
     image = _with_ghost(image, meshes, step, camera)
     arrow = project(arc, camera)[:, :2]
@@ -163,7 +157,7 @@ def _owners(
     faces = np.concatenate(
         [faces + start for (_, faces), start in zip(meshes, starts, strict=False)]
     ).astype(np.int32)
-    screen = project(_points(meshes, poses, range(len(meshes))), camera)
+    screen = project(posed_points(meshes, poses), camera)
     _, nearest = fill_triangles(screen, faces, *size)
     owner = np.repeat(np.arange(len(meshes)), counts)
     return np.where(nearest >= 0, owner[nearest], -1)

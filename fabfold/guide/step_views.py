@@ -17,7 +17,7 @@ from fabfold.guide.fold_steps import FoldStep
 from fabfold.joinery.bodies import Joinery
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["FIRST_VIEW", "StepView", "step_views", "visible_shares"]
+__all__ = ["FIRST_VIEW", "StepView", "step_views", "visible_share"]
 
 #: Pixels of the small pictures in which it is counted what can be seen.
 _PIXELS = (112, 84)
@@ -95,7 +95,7 @@ def _blocks(joinery: Joinery, tree: FoldTree) -> _Blocks:
     return _Blocks(np.concatenate(cubes), faces.astype(np.int32), owner)
 
 
-def visible_shares(
+def visible_share(
     points: NDArray[np.float64],
     faces: NDArray[np.int32],
     moving: NDArray[np.bool_],
@@ -145,8 +145,8 @@ def _score(blocks: _Blocks, step: FoldStep, direction: tuple[float, float]) -> t
     moving = np.isin(blocks.body, step.moving)[blocks.faces[:, 0]]
     view = View(*direction, size=_PIXELS)
     within = np.concatenate([before, after])
-    first = visible_shares(before, blocks.faces, moving, view, within)
-    last = visible_shares(after, blocks.faces, moving, view, within)
+    first = visible_share(before, blocks.faces, moving, view, within)
+    last = visible_share(after, blocks.faces, moving, view, within)
     azimuth, height = np.radians(direction)
     away = np.array(
         [np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height), np.sin(height)]

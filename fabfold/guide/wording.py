@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from fabfold.guide.fold_steps import FoldStep
 
-__all__ = ["listed", "step_text"]
+__all__ = ["listed", "part_number", "step_text"]
 
 _TURNS = {90: "Quarter turn", 180: "Half turn", 270: "Three quarters of a turn"}
 
@@ -16,20 +16,25 @@ def listed(words: Sequence[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def step_text(step: FoldStep) -> str:
+def part_number(body: int) -> str:
+    """What a manual calls a body: they are counted from 1 there, and from 0 everywhere else."""
+    return str(body + 1)
+
+
+def step_text(step: FoldStep, *, brief: bool = False) -> str:
     """One line about a step: how far, and which parts.
 
     Parameters
     ----------
     step : FoldStep
         The step.
-
-    Returns
-    -------
-    str
-        Parts are counted from 1, as the bodies are from 0.
+    brief : bool
+        Whether to say how many parts turn together, in place of their numbers.
     """
-    parts = [str(body + 1) for body in step.moving]
-    turn = _TURNS.get(round(step.degrees), "Turn")
-    which = f"part {parts[0]}" if len(parts) == 1 else f"parts {listed(parts)} together"
-    return f"{turn} ({step.degrees:g}°): {which}"
+    parts = [part_number(body) for body in step.moving]
+    which = f"parts {listed(parts)} together"
+    if len(parts) == 1:
+        which = f"part {parts[0]}"
+    elif brief:
+        which = f"{len(parts)} parts together"
+    return f"{_TURNS.get(round(step.degrees), 'Turn')} ({step.degrees:g}°): {which}"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fabfold.errors import RecipeError
 from fabfold.export.colours import body_colours
-from fabfold.export.kit_picture import strip
+from fabfold.export.kit_picture import strip, write_strip
 from fabfold.export.render import png_bytes
 from fabfold.files import write_bytes, write_text
 from fabfold.guide.advice import assembly_lines, content_lines, print_lines
@@ -19,11 +19,14 @@ from fabfold.printing.print_mode import PrintMode
 from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
 
-__all__ = ["render_kit", "write_guide"]
+__all__ = ["PICTURE", "render_kit", "write_guide"]
+
+#: What the picture of the kit is called among the files for Bambu Studio.
+PICTURE = "Model Pictures/folding.png"
 
 
 def write_guide(
-    folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltTree
+    folder: Path, recipe: Recipe, mode: PrintMode, built: BuiltTree, progress: Progress
 ) -> dict[str, bytes]:
     """Write ``fold.png``, ``manual.pdf``, ``manual-letter.pdf``, ``manual.html``, ``fold.html``.
 
@@ -37,6 +40,8 @@ def write_guide(
         How it is printed.
     built : BuiltTree
         Tree, motion with certificate, and printed bodies.
+    progress : Progress
+        Hears of every step that is drawn.
 
     Returns
     -------
@@ -60,6 +65,7 @@ def write_guide(
         contents=content_lines(joinery, tree, mode, built.retention),
         advice=print_lines(mode, joinery),
         assembly=assembly_lines(joinery, built.apart),
+        progress=progress,
     )
     paper = manual_pdf(manual, "a4")
     write_bytes(folder / "manual.pdf", paper)
@@ -78,7 +84,7 @@ def write_guide(
     write_text(folder / "fold.html", page)
     return {
         "Assembly Guide/manual.pdf": paper,
-        "Model Pictures/folding.png": picture,
+        PICTURE: picture,
     }
 
 
@@ -90,7 +96,7 @@ def render_kit(built: BuiltTree, path: Path, size: tuple[int, int], progress: Pr
     built : BuiltTree
         Tree, motion and printed bodies.
     path : Path
-        File to write; its ending says what, see :data:`fabfold.guide.film.FILM_ENDINGS`.
+        File to write; its ending says what: ``.mp4``, ``.gif`` or ``.png``.
     size : (int, int)
         Width and height of the film in pixels.
     progress : Progress
@@ -101,15 +107,17 @@ def render_kit(built: BuiltTree, path: Path, size: tuple[int, int], progress: Pr
     RecipeError
         If it cannot be written as such a file.
     """
-    from fabfold.export.weld import printable_mesh
     from fabfold.guide.film import FILM_ENDINGS, write_film
 
-    if path.suffix.lower() not in FILM_ENDINGS:  # Before anything is drawn.
-        endings = ", ".join(FILM_ENDINGS)
+    ending = path.suffix.lower()
+    if ending not in (*FILM_ENDINGS, ".png"):  # Before anything is drawn.
+        endings = ", ".join((*FILM_ENDINGS, ".png"))
         raise RecipeError(f"--output {path.name}: its ending must be one of {endings}")
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
     upright, colours = built.planned.voxels.rotation.T, body_colours(tree)
+    if ending == ".png":
+        write_strip(path, joinery, tree, motion, colours=colours, upright=upright)
+        return
     plan = plan_steps(joinery, tree, motion, upright)
-    meshes = [(v.astype(float), f) for v, f in map(printable_mesh, joinery.bodies)]
-    picture = strip(joinery, tree, motion, colours=colours, upright=upright)
-    write_film(path, meshes, colours, plan, picture, size=size, progress=progress)
+    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
+    write_film(path, meshes, colours, plan, size=size, progress=progress)

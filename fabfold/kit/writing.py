@@ -19,12 +19,12 @@ from fabfold.export.urdf import write_urdf
 from fabfold.files import write_bytes, write_json, write_text
 from fabfold.joinery.magnets import Retention
 from fabfold.kit.box_closure import BoxClosure
-from fabfold.kit.guide_files import write_guide
+from fabfold.kit.guide_files import PICTURE, write_guide
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.lattice.template import Template
 from fabfold.printing.checks import Check
 from fabfold.printing.print_mode import PrintMode
-from fabfold.progress import Progress
+from fabfold.progress import Progress, ProgressPart
 from fabfold.recipe.recipe import Recipe
 from fabfold.search.pareto import Solution
 from fabfold.solid.closed_solid import Solid
@@ -376,7 +376,7 @@ def write_kit(
     colours = body_colours(tree)
     write_text(folder / "kit.toml", recipe.to_toml())
     progress.update(0.05, "pictures of the steps")
-    guide = write_guide(folder, recipe, mode, built)
+    guide = write_guide(folder, recipe, mode, built, ProgressPart(progress, 0.05, 0.5))
     progress.update(0.5, "bodies and 3MF")
     write_printable(folder, recipe, mode, built, guide)
     flat = None if template is None else flat_poses(joinery, tree, motion, template)
@@ -395,6 +395,6 @@ def write_kit(
     progress.update(0.8, "STEP")
     finish_step()
     progress.update(0.95, "report")
-    pictures = [("As it is printed, half-way, and folded", (folder / "fold.png").read_bytes())]
+    pictures = [("As it is printed, half-way, and folded", guide[PICTURE])]
     write_checks(folder, solid, built, checks, wishes, closure, mode.profile.name, pictures)
     progress.update(1.0, str(folder))
