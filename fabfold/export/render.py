@@ -106,28 +106,50 @@ def render(
     screen = project(vertices, camera)
     near, triangle = fill_triangles(screen, corners, *pixels)
     points, facing = surface_points(triangle, screen, corners, vertices, normals)
+    # Without a ground there is nothing to draw beside the model.
+    window = np.s_[:, :] if view.ground else _window(triangle, samples)
+    near, triangle, points, facing = near[window], triangle[window], points[window], facing[window]
     covered = triangle >= 0
-    floor = ShadowFloor(vertices, camera, view)
-    light = light_at(
-        np.concatenate([points[covered], floor.points]),
-        np.concatenate([facing[covered], floor.normals]),
-        vertices,
-        corners,
-        view,
-    )
+    places, directions = points[covered], facing[covered]
+    floor = ShadowFloor(vertices, camera, view) if view.ground else None
+    if floor is not None:
+        places = np.concatenate([places, floor.points])
+        directions = np.concatenate([directions, floor.normals])
+    light = light_at(places, directions, vertices, corners, view)
     image = np.empty((*triangle.shape, 3), dtype=np.float32)
     image[:] = linear_light(view.background)
     on_model = int(covered.sum())
-    shadow = floor.darkened(light[on_model:])
-    image *= np.repeat(np.repeat(shadow, samples, axis=0), samples, axis=1)[..., None]
+    if floor is not None:
+        shadow = floor.darkened(light[on_model:])
+        image *= np.repeat(np.repeat(shadow, samples, axis=0), samples, axis=1)[..., None]
     paint = linear_light(colours)[owner]
     image[covered] = _painted(
         paint[triangle[covered]], light[:on_model], points[covered], facing[covered], camera, view
     )
     lines = _lines(triangle, near, facing * covered[..., None], owner)
     image *= (1.0 - view.edges * lines)[..., None]
-    height, width = view.size[1], view.size[0]
-    return bytes_of_light(image.reshape(height, samples, width, samples, 3).mean(axis=(1, 3)))
+    rows, columns = (side // samples for side in triangle.shape)
+    seen = image.reshape(rows, samples, columns, samples, 3).mean(axis=(1, 3))
+    width, height = view.size
+    whole = np.empty((height, width, 3), dtype=np.float32)
+    whole[:] = linear_light(view.background)
+    top, left = ((part.start or 0) // samples for part in window)
+    whole[top : top + rows, left : left + columns] = seen
+    return bytes_of_light(whole)
+
+
+def _window(triangle: NDArray[np.int32], samples: int) -> tuple[slice, slice]:
+    """Rows and columns of whole pixels that hold every sample of the model and its outline."""
+    covered = triangle >= 0
+    parts = []
+    for axis in (1, 0):
+        found = np.flatnonzero(covered.any(axis=axis))
+        size = covered.shape[1 - axis]
+        first, last = (int(found[0]), int(found[-1])) if len(found) else (0, 0)
+        low = max(0, first - 1) // samples * samples
+        high = min(size, -(-(last + 2) // samples) * samples)
+        parts.append(slice(low, high))
+    return parts[0], parts[1]
 
 
 def _gathered(
