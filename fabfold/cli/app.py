@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fabfold.cli.command_options import (
+    Actions,
     BoxMm,
     ClearanceMm,
     Closed,
@@ -26,6 +27,7 @@ from fabfold.cli.command_options import (
     Keep,
     KeepWeight,
     MagnetName,
+    Method,
     ObjectName,
     Origin,
     Output,
@@ -186,6 +188,8 @@ def _stage(name: str, summary: str) -> None:
         joints_inside: JointsInside = None,
         share: Share = None,
         pick: Pick = None,
+        method: Method = None,
+        actions: Actions = None,
         workers: Workers = None,
         scheduler: Scheduler = None,
         time: Time = None,

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 __all__ = [
+    "Actions",
     "BoxMm",
     "ClearanceMm",
     "Closed",
@@ -20,6 +21,7 @@ __all__ = [
     "Keep",
     "KeepWeight",
     "MagnetName",
+    "Method",
     "ObjectName",
     "Origin",
     "Output",
@@ -161,6 +163,24 @@ Closed = Annotated[
     typer.Option(
         "--closed",
         help="Search until the box is closed to this share, such as 0.85, or say it cannot be.",
+        show_default=False,
+    ),
+]
+Method = Annotated[
+    str | None,
+    typer.Option(
+        "--method",
+        metavar="planner|physics",
+        help="How the folding path is found: planned on the lattice, or by forces that unfold both "
+        "shapes in a simulation until they meet. Default: planner.",
+    ),
+]
+Actions = Annotated[
+    str | None,
+    typer.Option(
+        "--actions",
+        metavar="FILE",
+        help="With --method physics: pins, pushes and carving that help the forces, as recorded.",
         show_default=False,
     ),
 ]

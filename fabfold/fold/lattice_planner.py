@@ -35,6 +35,7 @@ __all__ = [
     "count_free_moves",
     "find_path",
     "kernel_inputs",
+    "moves_of_steps",
     "refined",
     "stuck_hinges",
 ]
@@ -190,7 +191,7 @@ def stuck_hinges(system: HingeSystem, *, carve: float | None = None) -> NDArray[
     return stuck
 
 
-def _moves_of_steps(
+def moves_of_steps(
     system: HingeSystem, mech: Mechanism, steps: NDArray[np.int16]
 ) -> NDArray[np.int32]:
     """Steps of the mechanism as moves of the system, neighbours of one hinge in one move."""
@@ -263,7 +264,7 @@ def find_path(
         return PlannerResult(int(remaining), total, int(used), None, apart, found)
     if short:
         steps = shorten(mech, scene, table, whole, carve is not None, steps)
-    return PlannerResult(0, total, int(used), _moves_of_steps(system, mech, steps), apart, found)
+    return PlannerResult(0, total, int(used), moves_of_steps(system, mech, steps), apart, found)
 
 
 def count_free_moves(

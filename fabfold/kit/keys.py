@@ -51,6 +51,7 @@ def fold_key(recipe: Recipe, template: Template, mark: list[Any]) -> str:
         [recipe.surface_weight, recipe.single_weight, recipe.effort, recipe.rounds],
         *([["wished", *asked], ["pick", recipe.pick]] if asked or recipe.pick else []),
         *([] if recipe.closed is None else [["closed", recipe.closed]]),
+        *([["forces", recipe.actions_sha256]] if recipe.method == "physics" else []),
         mark,
     )
 

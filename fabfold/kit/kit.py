@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fabfold.errors import KitError, RecipeError
-from fabfold.files import write_text
+from fabfold.files import sha256_of, write_text
 from fabfold.kit import keys
 from fabfold.kit.stage_runner import StageRunner
 from fabfold.kit.stages import BuiltTree, PlannedTree, build_first
 from fabfold.lattice.template import Template
-from fabfold.progress import Progress
+from fabfold.progress import Progress, SilentProgress
 from fabfold.recipe.recipe import Recipe
 from fabfold.recipe.start import require_free_folder, set_up_project, with_size
 from fabfold.recipe.targets import load_target
@@ -54,6 +54,8 @@ class Kit(StageRunner):
         The model's file; None for a sample.
     template : Path or None
         The template's file; None for a box or a shipped template.
+    actions : Path or None
+        File of what a person did in an unfolding by forces.
     folder : Path or None
         Kit folder that keeps finished stages; None works in memory until :meth:`export`.
     workers : int or None
@@ -70,6 +72,7 @@ class Kit(StageRunner):
         *,
         model: Path | None = None,
         template: Path | None = None,
+        actions: Path | None = None,
         folder: Path | None = None,
         workers: int | None = None,
         scheduler: str | None = None,
@@ -89,11 +92,10 @@ class Kit(StageRunner):
         self.workers = workers
         self.scheduler = scheduler
         self.seconds = seconds
-        self._model = model
         self._accepted = False
         self._early: EarlyKit | None = None
         self._compiler: KernelCompiler | None = None
-        self._template_file = template
+        self._files = {"model": model, "template": template, "actions": actions}
         self._template: Template = load_target(recipe.template, template, recipe.template_cells)
         if recipe.joints_inside:
             self._template = replace(self._template, joints="inside")
@@ -144,7 +146,7 @@ class Kit(StageRunner):
 
         def make(progress: Progress) -> Solid:
             progress.update(None, self.recipe.model)
-            solid = load_model(self._model or self.recipe.model, self.recipe.object)
+            solid = load_model(self._files["model"] or self.recipe.model, self.recipe.object)
             progress.update(1.0, f"{len(solid.faces)} triangles")
             return solid
 
@@ -202,7 +204,7 @@ class Kit(StageRunner):
         from fabfold.kit.stage_files import load_planned, save_planned
 
         def make(progress: Progress) -> PlannedTree:
-            planned = next(self._planned_trees())
+            planned = next(self._planned_trees(progress))
             hinges, moves = len(planned.tree.hinges), len(planned.motion.moves) - 1
             progress.update(1.0, f"{hinges} hinges, {moves} moves")
             return planned
@@ -226,7 +228,7 @@ class Kit(StageRunner):
         best = self.fold()
 
         def make(progress: Progress) -> BuiltTree:
-            trees = chain([best], islice(self._planned_trees(), 1, None))
+            trees = chain([best], islice(self._planned_trees(progress), 1, None))
             return build_first(trees, mode, self.recipe.voxel_mm, progress)
 
         key = keys.join_key(self.recipe, self._template, mode, self._mark())
@@ -340,10 +342,9 @@ class Kit(StageRunner):
 
     def _keep_inputs(self, store: StageStore) -> None:
         """Copy the files that the recipe names."""
-        if self._model is not None:
-            store.keep(self._model, self.recipe.sha256, "model")
-        if self._template_file is not None:
-            store.keep(self._template_file, self.recipe.template_sha256, "template")
+        for name, file in self._files.items():
+            if file is not None:
+                store.keep(file, sha256_of(file), name)
 
     def _rounds(self) -> Rounds:
         if "rounds" not in self._results:
@@ -428,18 +429,18 @@ class Kit(StageRunner):
 
         return picked(self.pareto(), self.recipe.pick)
 
-    def _planned_trees(self) -> Iterator[PlannedTree]:
-        """Every candidate of every round, best first, with its lattice path as a motion."""
-        from fabfold.fold.motion import motion_of
+    def _planned_trees(self, progress: Progress | None = None) -> Iterator[PlannedTree]:
+        """Every candidate of every round, best first, with its path as the recipe finds it."""
+        from fabfold.kit.planning import paths_by_forces, planned_trees
 
         if self.recipe.pick:
             picked = self._picked()
-            tree, path = picked.candidate.tree, picked.candidate.path
-            yield PlannedTree(picked.voxels, tree, motion_of(tree, path))
-            return
-        for pairs in self._rounds().found():
-            for voxels, candidate in pairs:
-                yield PlannedTree(voxels, candidate.tree, motion_of(candidate.tree, candidate.path))
+            trees = planned_trees([[(picked.voxels, picked.candidate)]])
+        else:
+            trees = planned_trees(self._rounds().found())
+        if self.recipe.method == "physics":
+            trees = paths_by_forces(trees, self._files["actions"], progress or SilentProgress())
+        return trees
 
     def _accept(self) -> None:
         """Write the recipe and keep the files that it names, before what was made is kept."""
@@ -493,6 +494,7 @@ def open_kit(
         start.recipe,
         model=start.model,
         template=start.template,
+        actions=start.actions,
         folder=start.folder,
         workers=workers,
         scheduler=scheduler,

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +19,11 @@ from fabfold.errors import CheckError
 from fabfold.fold.clashes import clashes_on
 from fabfold.fold.core_sweep import CORE_HALF_SIDE
 from fabfold.fold.motion import Motion, end_pose_error, quarter_path
+from fabfold.physics.rig import Box, Motor, rig_model
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import WHOLE, unpacked
 from fabfold.tree.system import hinge_system
-
-if TYPE_CHECKING:
-    import mujoco
 
 __all__ = ["ReplayReport", "material_boxes", "replay"]
 
@@ -77,7 +74,7 @@ def material_boxes(
     origin_mm: Sequence[float],
     gap_mm: float,
     carved: Collection[int] = (),
-) -> list[tuple[int, F64, F64]]:
+) -> list[Box]:
     """Boxes about the material that each body has in each of its cells.
 
     Of a voxel that shares its cell in B there is a box about the material in each eighth.
@@ -94,8 +91,8 @@ def material_boxes(
 
     Returns
     -------
-    list of (body, low, high)
-        Corners in lattice units of shape A; cells without material are left out. A link plate is a
+    list of Box
+        Cells without material are left out. A link plate is a
         sheet of a third of the gap in the middle of its face: its pockets do not show in boxes.
     """
     import manifold3d
@@ -104,7 +101,7 @@ def material_boxes(
     found = []
     for index, (body, (vertices, faces)) in enumerate(zip(tree.bodies, meshes, strict=True)):
         if body.edge is not None:
-            found.append((index, *_sheet(tree, index, vertices, voxel_mm, origin_mm, gap_mm)))
+            found.append(Box(index, *_sheet(tree, index, vertices, voxel_mm, origin_mm, gap_mm)))
             continue
         lattice = (np.asarray(vertices, dtype=float) - np.asarray(origin_mm, float)) / voxel_mm
         solid = manifold3d.Manifold(
@@ -126,7 +123,7 @@ def material_boxes(
                     continue
                 box = np.array(piece.bounding_box())
                 if (box[3:] - box[:3]).min() > 1e-6:
-                    found.append((index, box[:3], box[3:]))
+                    found.append(Box(index, box[:3], box[3:]))
     return found
 
 
@@ -159,58 +156,6 @@ def _sheet(
     low = np.where(flat, np.maximum(lattice.min(axis=0), middle - room), middle - thick)
     high = np.where(flat, np.minimum(lattice.max(axis=0), middle + room), middle + thick)
     return low, high
-
-
-def _model(tree: FoldTree, boxes: list[tuple[int, F64, F64]]) -> mujoco.MjModel:
-    """Bodies with all frames at the origin of shape A, joint positions in its coordinates."""
-    import mujoco
-
-    spec = mujoco.MjSpec()
-    spec.option.gravity = [0.0, 0.0, 0.0]
-    spec.option.timestep = _TIME_STEP
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    # A rigid group must not pass through the body that it hangs on.
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
-    bodies = [spec.worldbody.add_body(name=tree.bodies[0].name)]
-    for hinge in tree.hinges:
-        body = bodies[hinge.parent].add_body(name=tree.bodies[hinge.child].name)
-        body.add_joint(
-            name=hinge.name,
-            type=mujoco.mjtJoint.mjJNT_HINGE,
-            pos=list(hinge.point),
-            axis=[float(x) for x in hinge.direction],
-            armature=0.02,
-            damping=[_DAMPING, 0.0, 0.0],
-        )
-        motor = spec.add_actuator(name=hinge.name, target=hinge.name)
-        motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
-        motor.set_to_position(kp=_GAIN, kv=_BRAKE)
-        bodies.append(body)
-    for index, low, high in boxes:
-        bodies[index].add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=(0.5 * (low + high)).tolist(),
-            size=(0.5 * (high - low)).tolist(),
-            density=0.02,
-            condim=1,
-            solref=[0.02, 1.0],
-        )
-    filled = {index for index, _, _ in boxes}
-    for index, body in enumerate(bodies):
-        if index in filled:
-            continue
-        # Every body weighs something, also one whose material all lies outside its cells.
-        centre = tree.hinges[index - 1].point if index else (0.0, 0.0, 0.0)
-        body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            pos=list(centre),
-            size=[0.2, 0.0, 0.0],
-            density=0.02,
-            contype=0,
-            conaffinity=0,
-        )
-    return spec.compile()
 
 
 def _carved_voxels(tree: FoldTree, motion: Motion) -> set[int]:
@@ -272,7 +217,10 @@ def replay(
         gap_mm = float(motion.certificate.get("min_gap_mm", 0.015 * voxel_mm))
     carved = _carved_voxels(tree, motion)
     boxes = material_boxes(tree, meshes, voxel_mm, origin_mm, gap_mm, carved)
-    model = _model(tree, boxes)
+    model = rig_model(
+        tree, boxes, time_step=_TIME_STEP, density=0.02, damping=_DAMPING,
+        motor=Motor(_GAIN, _BRAKE),
+    )  # fmt: skip
     data = mujoco.MjData(model)
     # The compiler numbers bodies depth first: ask for places by name.
     joint = np.array([int(model.joint(h.name).qposadr[0]) for h in tree.hinges], dtype=int)

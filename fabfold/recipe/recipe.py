@@ -132,6 +132,14 @@ class Recipe(BaseModel):
     share: Annotated[
         bool, Field(description="two voxels may share a cell where their material allows it")
     ] = False
+    method: Annotated[
+        Literal["planner", "physics"],
+        Field(description="who finds the folding path: the planner, or forces in a simulation"),
+    ] = "planner"
+    actions: Annotated[
+        str, Field(description="file of pins, pushes and carving that help the forces")
+    ] = ""
+    actions_sha256: Annotated[str, Field(description="digest of that file")] = ""
     pick: Annotated[
         int, Field(ge=0, le=1000, description="solution of the Pareto list; 0 is the best tree")
     ] = 0

@@ -10,7 +10,13 @@ from typing import Any
 from fabfold.errors import KitError, ModelError, RecipeError
 from fabfold.files import sha256_of
 from fabfold.recipe.recipe import Recipe, make_recipe, read_recipe
-from fabfold.recipe.targets import find_input, is_file_name, load_target, named_target
+from fabfold.recipe.targets import (
+    find_input,
+    is_file_name,
+    load_target,
+    named_actions,
+    named_target,
+)
 
 __all__ = ["ProjectSetup", "require_free_folder", "set_up_project", "with_size"]
 
@@ -32,12 +38,15 @@ class ProjectSetup:
         The template's file; None for a box or a shipped template.
     folder : Path or None
         Kit folder; None where there is none yet.
+    actions : Path or None
+        File of what a person did in an unfolding by forces; None where nobody did anything.
     """
 
     recipe: Recipe
     model: Path | None
     template: Path | None
     folder: Path | None
+    actions: Path | None = None
 
 
 def set_up_project(source: str, folder: Path | None, options: Mapping[str, Any]) -> ProjectSetup:
@@ -63,8 +72,12 @@ def set_up_project(source: str, folder: Path | None, options: Mapping[str, Any])
     """
     given = {key: value for key, value in options.items() if value is not None}
     template: Path | None = None
+    actions: Path | None = None
     if "template" in given:
         fields, template = named_target(str(given["template"]))
+        given.update(fields)
+    if "actions" in given:
+        fields, actions = named_actions(str(given["actions"]))
         given.update(fields)
     path = Path(source)
     if path.is_dir():
@@ -72,17 +85,18 @@ def set_up_project(source: str, folder: Path | None, options: Mapping[str, Any])
             raise KitError(f"{path}: a folder without kit.toml is no kit; give a model file")
         path = path / "kit.toml"
     if path.suffix == ".toml":
-        return _from_recipe(path, path.parent if folder is None else folder, given, template)
+        start = _from_recipe(path, path.parent if folder is None else folder, given, template)
+        return start if actions is None else replace(start, actions=actions)
     if source.startswith("sample:"):
         from fabfold.samples.builtin import sample
 
         given.setdefault("template", sample(source.removeprefix("sample:")).template)
-        return ProjectSetup(make_recipe(model=source, **given), None, template, folder)
+        return ProjectSetup(make_recipe(model=source, **given), None, template, folder, actions)
     if not path.is_file():
         raise ModelError(f"{source}: no such file (built-in samples are written sample:NAME)")
     given.setdefault("template", _USUAL)
     recipe = make_recipe(model=path.name, sha256=sha256_of(path), **given)
-    return ProjectSetup(recipe, path, template, folder)
+    return ProjectSetup(recipe, path, template, folder, actions)
 
 
 def _from_recipe(
@@ -99,7 +113,10 @@ def _from_recipe(
     model: Path | None = None
     if not recipe.model.startswith("sample:"):
         model = find_input(recipe.model, recipe.sha256, path.parent, "model")
-    return ProjectSetup(recipe, model, template, folder)
+    actions: Path | None = None
+    if recipe.actions and "actions" not in given:
+        actions = find_input(recipe.actions, recipe.actions_sha256, path.parent, "actions")
+    return ProjectSetup(recipe, model, template, folder, actions)
 
 
 def with_size(start: ProjectSetup, box_mm: float | None, scale: float | None) -> ProjectSetup:

@@ -9,7 +9,7 @@ from fabfold.files import sha256_of
 from fabfold.lattice.shipped import load_template
 from fabfold.lattice.template import Template
 
-__all__ = ["find_input", "is_file_name", "load_target", "named_target"]
+__all__ = ["find_input", "is_file_name", "load_target", "named_actions", "named_target"]
 
 #: Suffixes of files that can be a target besides ``.toml``: those that can be a model.
 MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".step", ".stp")
@@ -66,6 +66,22 @@ def named_target(given: str) -> tuple[dict[str, str], Path | None]:
     if not path.is_file():
         raise TemplateError(f"template {given!r}: there is no such file")
     return {"template": path.name, "template_sha256": sha256_of(path)}, path
+
+
+def named_actions(given: str) -> tuple[dict[str, str], Path | None]:
+    """Fields of the recipe for a file of actions, and the file; none for the empty name.
+
+    Raises
+    ------
+    RecipeError
+        If there is no such file.
+    """
+    if not given:
+        return {"actions": "", "actions_sha256": ""}, None
+    path = Path(given)
+    if not path.is_file():
+        raise RecipeError(f"--actions {given}: there is no such file")
+    return {"method": "physics", "actions": path.name, "actions_sha256": sha256_of(path)}, path
 
 
 def find_input(name: str, sha256: str, beside: Path, kept: str) -> Path:
