@@ -36,10 +36,11 @@ from numpy.typing import NDArray
 
 from .barrel import default_pin_radius, default_radii
 from .clearance import Clearance
+from .joint_play import Play, play
 from .leaf import Bracket
 from .options import BarrelKeywords, MeshKeywords, MeshOptions
 from .plan_double import DoubleSpec, plan_double, plate_shape
-from .plan_single import SingleSpec, plan_single
+from .plan_single import SinglePlan, SingleSpec, plan_single
 from .printed_pins import ConePin
 from .shapes import HalfPlan, Moved, Prism, Shape
 
@@ -55,6 +56,7 @@ __all__ = [
     "manifold_of",
     "mesh_part",
     "single_hinge_meshes",
+    "single_hinge_play",
 ]
 
 
@@ -326,13 +328,53 @@ def _sizes(voxel_mm: float, clearance_mm: float, knuckles: int, options: MeshOpt
     )
 
 
+def _plan(voxel_mm: float, knuckles: int, sizes: _Sizes) -> SinglePlan:
+    spec = SingleSpec.read(voxel_mm, knuckles=knuckles, leaf=sizes.bracket, **sizes.keywords)
+    return plan_single(spec)
+
+
+def single_hinge_play(
+    voxel_mm: float,
+    clearance_mm: float,
+    angle: float,
+    *,
+    knuckles: int = 3,
+    **options: Unpack[MeshKeywords],
+) -> Play:
+    """Play of the hinge that :func:`single_hinge_meshes` builds.
+
+    Parameters
+    ----------
+    voxel_mm, clearance_mm, knuckles, **options
+        As of :func:`single_hinge_meshes`.
+    angle : float
+        Angle of the hinge in degrees.
+
+    Returns
+    -------
+    Play
+        How far its child shifts and tilts.
+
+    Raises
+    ------
+    FitError, HingeError
+        As of :func:`single_hinge_meshes`.
+
+    Examples
+    --------
+    >>> round(single_hinge_play(20, 0.3, 180).axial[1], 3)
+    0.3
+    """
+    sizes = _sizes(float(voxel_mm), float(clearance_mm), knuckles, MeshOptions(**options))
+    return play(_plan(float(voxel_mm), knuckles, sizes), angle)
+
+
 @lru_cache(maxsize=64)
 def _single(
     voxel_mm: float, clearance_mm: float, knuckles: int, options: MeshOptions
 ) -> HingeMeshes:
     sizes = _sizes(voxel_mm, clearance_mm, knuckles, options)
-    spec = SingleSpec.read(voxel_mm, knuckles=knuckles, leaf=sizes.bracket, **sizes.keywords)
-    plan = plan_single(spec)
+    plan = _plan(voxel_mm, knuckles, sizes)
     parent, parent_carve = half_manifolds(plan.parent, options.segments)
     child, child_carve = half_manifolds(plan.child, options.segments)
     return HingeMeshes(

@@ -55,10 +55,9 @@ def test_a_fold_into_the_parent_is_felt():
 def test_boxes_hold_the_material_of_each_cell():
     tree, meshes = kit()
     boxes = material_boxes(tree, meshes, 10.0, ORIGIN, 0.3)
-    assert [body for body, _, _ in boxes] == [0, 0, 1, 1, 2, 2, 3, 3]
-    _, low, high = boxes[2]
-    assert low == pytest.approx([1.515, -0.485, -0.485])
-    assert high == pytest.approx([2.485, 0.485, 0.485])
+    assert [box.body for box in boxes] == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert boxes[2].low == pytest.approx([1.515, -0.485, -0.485])
+    assert boxes[2].high == pytest.approx([2.485, 0.485, 0.485])
 
 
 def test_motion_of_gives_a_keyframe_after_every_move():

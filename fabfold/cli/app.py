@@ -320,6 +320,42 @@ def render(
     typer.echo(output)
 
 
+@app.command()
+@_guarded
+def rehearse(
+    source: Annotated[str, typer.Argument(metavar="KIT", help="A kit folder.")],
+    up: Annotated[
+        str, typer.Option("--up", help="Side of the model that is up: +x, -x, +y, -y, +z or -z.")
+    ] = "+z",
+    friction: Annotated[
+        float, typer.Option("--friction", help="Coefficient between parts that touch.")
+    ] = 0.3,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fold a kit with its weight, in MuJoCo: torque of each hinge, and does the box stay shut."""
+    from fabfold.cli.console import ConsoleListener, show_rehearsal
+    from fabfold.kit.kit import open_kit
+    from fabfold.progress import SilentListener
+    from fabfold.proof.rehearsal import SIDES
+    from fabfold.proof.rehearsal import rehearse as rehearsed
+
+    if up not in SIDES:
+        raise RecipeError(f"--up {up}: must be one of {', '.join(SIDES)}")
+    if not 0.0 <= friction <= 10.0:
+        raise RecipeError(f"--friction {friction}: must be a number from 0 to 10")
+    listener = SilentListener() if quiet or as_json else ConsoleListener()
+    kit = open_kit(source)
+    built = kit.join()
+    density = kit.print_mode().profile.density_g_cm3
+    with listener.stage("rehearse") as progress:
+        found = rehearsed(
+            built.planned.tree, built.planned.motion, built.joinery, density, up=up,
+            friction=friction, retention=built.retention, progress=progress,
+        )  # fmt: skip
+    show_rehearsal(found, built.planned.tree, as_json=as_json)
+
+
 @app.command("list")
 @_guarded
 def list_things(

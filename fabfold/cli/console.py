@@ -20,9 +20,18 @@ from fabfold.progress import Progress, processor_seconds
 if TYPE_CHECKING:
     from fabfold.kit.kit import Kit
     from fabfold.printing.checks import Check
+    from fabfold.proof.rehearsal import Rehearsal
     from fabfold.solid.inspection import Inspection
+    from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["ConsoleListener", "show_checks", "show_inspection", "show_list", "show_result"]
+__all__ = [
+    "ConsoleListener",
+    "show_checks",
+    "show_inspection",
+    "show_list",
+    "show_rehearsal",
+    "show_result",
+]
 
 _TITLES = {
     "solid": "Reading the model",
@@ -36,6 +45,7 @@ _TITLES = {
     "check": "Checking",
     "export": "Writing the kit",
     "render": "Drawing the fold",
+    "rehearse": "Folding with weight",
 }
 _STAGES = {
     "solid": "reading",
@@ -214,6 +224,30 @@ def show_checks(checks: Sequence[Check], about: Mapping[str, str], *, as_json: b
     passed = sum(check.ok for check in checks)
     which = harmless(", ".join(about.values()))
     console.print(f"{which}: {passed} of {len(checks)} checks passed")
+
+
+def show_rehearsal(found: Rehearsal, tree: FoldTree, *, as_json: bool) -> None:
+    """Print the torque of every hinge, and how the box keeps when it is let go."""
+    if as_json:
+        names = [hinge.name for hinge in tree.hinges]
+        print(json.dumps({"hinges": names, **found.to_json()}, indent=1))
+        return
+    console = _console()
+    table = Table(box=None, pad_edge=False)
+    table.add_column("hinge")
+    table.add_column("turning, N mm", justify="right")
+    table.add_column("held, N mm", justify="right")
+    for hinge, turned, held in zip(tree.hinges, found.torque_nmm, found.held_nmm, strict=True):
+        table.add_row(hinge.name, f"{turned:.1f}", f"{held:.1f}")
+    console.print(table)
+    shut = ", ".join(found.stays_shut)
+    console.print(
+        f"{found.weight_g:g} g, {found.up} up, friction {found.friction:g}. Let go, the box "
+        + (f"stays shut with {shut} up" if shut else "stays shut on none of its six sides")
+        + "; "
+        + ", ".join(f"{side} opens {angle:g}°" for side, angle in found.opens_deg.items()),
+        soft_wrap=True,
+    )
 
 
 def show_inspection(found: Inspection, *, as_json: bool) -> None:

@@ -39,6 +39,7 @@ summary { cursor: pointer; font-weight: 600; margin: 1.5rem 0 .5rem; }
 #: Checks that say whether it folds; all others are of printing.
 _FOLDING = ("tree folds", "path", "replay", "moves with", "pins that", "hinges that")
 _PATH = "smallest gap on the folding path"
+_PLAY = "play of the box pressed together"
 
 
 def _cell(value: Any) -> str:
@@ -112,6 +113,12 @@ def _answers(data: Mapping[str, Any]) -> str:
         if most is not None:
             text += f" These voxels allow {most:.0%}."
         cards.append(_answer("How closed is the box?", f"{closed:.0%}", text))
+    play = next((check for check in checks if check["name"] == _PLAY), None)
+    if play is not None:
+        text = (
+            f"Pressed together, an outer corner is off by no more; {play['note'].split('; ')[1]}."
+        )
+        cards.append(_answer("How loose is the box?", f"{_cell(play['figure'])} mm", text))
     if "box_mm" in summary:
         size = " × ".join(_cell(float(side)) for side in summary["box_mm"])
         pieces = f"{summary['bodies']} parts, {sum(summary['joints'].values())} joints"

@@ -19,6 +19,14 @@ from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.joinery.booleans import subtract
+from fabfold.joinery.box_faces import (
+    FaceMeeting,
+    across,
+    are_flush,
+    face_meetings,
+    is_material,
+    meeting_sides,
+)
 from fabfold.joinery.cells import solids_of
 from fabfold.joinery.loose_pins import cylinder_between
 from fabfold.joinery.soundness import printable_body
@@ -35,10 +43,6 @@ Floats = NDArray[np.float64]
 _ROOM_MM, _DEEP_MM, _WALL_MM = 0.2, 0.2, 0.8
 #: Places on a face that are tried, in voxel sides from its middle.
 _PLACES = (0.0, 0.22, -0.22)
-#: Share of a pocket with its wall that has to be material.
-_FILLED = 0.985
-#: Radius and depth of the disc of material in the middle of a face that makes it flat, mm.
-_PATCH_MM, _SKIN_MM = 2.0, 0.4
 #: Speeds below this count as none; a hinge turns at most at 1.
 _STILL = 1e-6
 
@@ -53,19 +57,22 @@ class DiscMagnet:
         Diameter and thickness in mm, such as ``"3x1"``.
     diameter_mm, thick_mm : float
         The same as numbers.
+    pull_n : float
+        What pulls two of them apart that touch, N: the low end of what dealers of N42 discs give.
     """
 
     name: str
     diameter_mm: float
     thick_mm: float
+    pull_n: float
 
 
 MAGNETS: Final[dict[str, DiscMagnet]] = {
     magnet.name: magnet
     for magnet in (
-        DiscMagnet("3x1", 3.0, 1.0),
-        DiscMagnet("4x2", 4.0, 2.0),
-        DiscMagnet("5x2", 5.0, 2.0),
+        DiscMagnet("3x1", 3.0, 1.0, 1.5),
+        DiscMagnet("4x2", 4.0, 2.0, 4.0),
+        DiscMagnet("5x2", 5.0, 2.0, 6.0),
     )
 }
 """Magnets that kits can be made with, by name."""
@@ -139,15 +146,6 @@ class Retention:
         return cls(data["magnet"], tuple(pairs), before, after)
 
 
-@dataclass(frozen=True)
-class _Meeting:
-    """Two cell faces that lie on each other in the box."""
-
-    bodies: tuple[int, int]
-    middle: Floats  # in the box, mm
-    normal: Floats  # from the first body to the second, in the box
-
-
 def hold_shut(
     tree: FoldTree, motion: Motion, joinery: Joinery, magnet: DiscMagnet
 ) -> tuple[Joinery, Retention]:
@@ -174,8 +172,8 @@ def hold_shut(
     poses = poses_in_mm(tree, joinery, motion.angles_deg[-1])
     speeds = _Speeds(tree, joinery, poses)
     solids = solids_of(joinery.bodies)
-    meetings = _meetings(tree, joinery, poses)
-    shut = [speeds.parting(m) for m in meetings if _flush(m, joinery, solids, poses)]
+    meetings = face_meetings(tree, joinery, poses)
+    shut = [speeds.parting(m) for m in meetings if are_flush(m, joinery, solids, poses)]
     bounds = np.concatenate(shut) if shut else np.zeros((0, len(tree.hinges)))
     held = np.zeros((0, len(tree.hinges)))
     before = free_hinges(bounds, held)
@@ -308,9 +306,9 @@ class _Speeds:
         """Rows (3, h) that are 0 where two bodies do not move against each other at a point."""
         return np.asarray(self.of(bodies[1], point) - self.of(bodies[0], point))
 
-    def parting(self, meeting: _Meeting) -> Floats:
+    def parting(self, meeting: FaceMeeting) -> Floats:
         """Rows (4, h), not below 0 where two faces do not run into each other."""
-        u, v = _across(meeting.normal)
+        u, v = across(meeting.normal)
         rows = []
         for i, j in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
             corner = meeting.middle + 0.3 * self._side * (i * u + j * v)
@@ -318,81 +316,23 @@ class _Speeds:
         return np.array(rows)
 
 
-def _across(normal: Floats) -> tuple[Floats, Floats]:
-    u = np.eye(3)[(int(np.abs(normal).argmax()) + 1) % 3]
-    return u, np.cross(normal, u)
-
-
-def _meetings(tree: FoldTree, joinery: Joinery, poses: Floats) -> list[_Meeting]:
-    """Faces of cells of two bodies that lie on each other in the box."""
-    origin, side = np.asarray(joinery.origin_mm), joinery.voxel_mm
-    owner = tree.voxel_body
-    middles = np.array(
-        [
-            poses[owner[i]][:3, :3] @ (origin + side * cell) + poses[owner[i]][:3, 3]
-            for i, cell in enumerate(tree.source.astype(float))
-        ]
-    )
-    found = []
-    for i in range(len(middles)):
-        for j in range(i + 1, len(middles)):
-            apart = middles[j] - middles[i]
-            if owner[i] == owner[j] or abs(float(np.linalg.norm(apart)) - side) > 1e-3 * side:
-                continue
-            normal = np.round(apart / side, 9)
-            found.append(_Meeting((int(owner[i]), int(owner[j])), middles[i] + apart / 2, normal))
-    return found
-
-
-def _sides(
-    meeting: _Meeting, place: Floats, joinery: Joinery, poses: Floats
-) -> list[tuple[int, Floats, Floats]]:
-    """Body, mouth and direction into it, shape A, on both sides of a place of a meeting."""
-    gap = joinery.clearance_mm if joinery.face_gap_mm is None else joinery.face_gap_mm
-    sides = []
-    for body, inward in zip(meeting.bodies, (-meeting.normal, meeting.normal), strict=True):
-        pose = poses[body]
-        into = pose[:3, :3].T @ inward
-        point = pose[:3, :3].T @ (place - pose[:3, 3]) + gap / 2 * into
-        sides.append((body, point, into))
-    return sides
-
-
-def _is_material(
-    solid: manifold3d.Manifold, point: Floats, into: Floats, radius: float, deep: float
-) -> bool:
-    """Whether a disc below a face is filled."""
-    disc = cylinder_between(point, point + deep * into, radius, outside=False)
-    return bool((solid ^ disc).volume() >= _FILLED * disc.volume())
-
-
-def _flush(
-    meeting: _Meeting, joinery: Joinery, solids: Sequence[manifold3d.Manifold], poses: Floats
-) -> bool:
-    """Whether both faces are flat in their middle, so that they meet."""
-    return all(
-        _is_material(solids[body], point + 0.02 * into, into, _PATCH_MM, _SKIN_MM)
-        for body, point, into in _sides(meeting, meeting.middle, joinery, poses)
-    )
-
-
 def _places(
-    meeting: _Meeting,
+    meeting: FaceMeeting,
     joinery: Joinery,
     solids: Sequence[manifold3d.Manifold],
     poses: Floats,
     magnet: DiscMagnet,
 ) -> list[tuple[MagnetPair, Floats]]:
     """The first place on a meeting with room for a pocket and its wall on both sides."""
-    u, v = _across(meeting.normal)
+    u, v = across(meeting.normal)
     radius = (magnet.diameter_mm + _ROOM_MM) / 2 + _WALL_MM
     deep = magnet.thick_mm + _DEEP_MM + _WALL_MM
     for i in _PLACES:
         for j in _PLACES:
             place = meeting.middle + joinery.voxel_mm * (i * u + j * v)
-            sides = _sides(meeting, place, joinery, poses)
+            sides = meeting_sides(meeting, place, joinery, poses)
             if all(
-                _is_material(solids[body], point + 0.02 * into, into, radius, deep)
+                is_material(solids[body], point + 0.02 * into, into, radius, deep)
                 for body, point, into in sides
             ):
                 (_, one, first), (_, other, second) = sides

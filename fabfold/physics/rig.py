@@ -65,8 +65,11 @@ def rig_model(
     density: float,
     damping: float,
     motor: Motor | None = None,
+    limits_deg: tuple[F64, F64] | None = None,
+    gravity: Sequence[float] = (0.0, 0.0, 0.0),
+    friction: float = 0.0,
 ) -> mujoco.MjModel:
-    """Model of a tree's bodies; the root is held, gravity is off, nothing rubs.
+    """Model of a tree's bodies; the root is held.
 
     Parameters
     ----------
@@ -81,7 +84,13 @@ def rig_model(
     damping : float
         Of every hinge, torque for 1 rad/s.
     motor : Motor, optional
-        Motors of the hinges' names. Without them each hinge is kept between its angles in A and B.
+        Motors of the hinges' names.
+    limits_deg : two (h,) float64 arrays, optional
+        Least and largest angle of every hinge, degrees.
+    gravity : (3,) sequence of float
+        Voxel sides / s².
+    friction : float
+        Coefficient between bodies that touch; 0 lets them slide.
 
     Returns
     -------
@@ -91,14 +100,14 @@ def rig_model(
     import mujoco
 
     spec = mujoco.MjSpec()
-    spec.option.gravity = [0.0, 0.0, 0.0]
+    spec.option.gravity = list(gravity)
     spec.option.timestep = time_step
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     # A rigid group must not pass through the body that it hangs on.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
     bodies = [spec.worldbody.add_body(name=tree.bodies[0].name)]
-    for hinge in tree.hinges:
+    for number, hinge in enumerate(tree.hinges):
         body = bodies[hinge.parent].add_body(name=tree.bodies[hinge.child].name)
         joint = body.add_joint(
             name=hinge.name,
@@ -108,10 +117,10 @@ def rig_model(
             armature=0.02,
             damping=[damping, 0.0, 0.0],
         )
-        if motor is None:
+        if limits_deg is not None:
             joint.limited = True
-            joint.range = sorted((0.0, hinge.angle_deg))
-        else:
+            joint.range = [float(limits_deg[0][number]), float(limits_deg[1][number])]
+        if motor is not None:
             actuator = spec.add_actuator(name=hinge.name, target=hinge.name)
             actuator.trntype = mujoco.mjtTrn.mjTRN_JOINT
             actuator.set_to_position(kp=motor.gain, kv=motor.brake)
@@ -123,7 +132,8 @@ def rig_model(
             pos=(0.5 * (box.low + box.high)).tolist(),
             size=(0.5 * (box.high - box.low)).tolist(),
             density=density,
-            condim=1,
+            condim=3 if friction else 1,
+            friction=[friction, 0.0, 0.0],
             solref=[0.02, 1.0],
         )
     for index in sorted(set(range(len(bodies))) - {box.body for box in boxes}):

@@ -26,7 +26,7 @@ from fabfold.tree.sharing import WHOLE, unpacked
 if TYPE_CHECKING:
     import mujoco
 
-__all__ = ["Unfolding", "cell_boxes"]
+__all__ = ["Unfolding", "cell_boxes", "repulsion"]
 
 F64 = NDArray[np.float64]
 
@@ -72,6 +72,25 @@ def cell_boxes(tree: FoldTree, carved: Collection[int]) -> tuple[list[Box], list
             boxes.append(Box(body, middle - half, middle + half))
             voxels.append(voxel)
     return boxes, voxels
+
+
+def repulsion(place: F64) -> F64:
+    """Force on every voxel: ∝ 1/r² from each other voxel (paper section 5).
+
+    Parameters
+    ----------
+    place : (n, 3) float64 array
+        Centres of the voxels, voxel sides.
+
+    Returns
+    -------
+    (n, 3) float64 array
+        Forces; 20 between two voxels one side apart.
+    """
+    away = place[:, None] - place[None, :]
+    square = np.einsum("nmi,nmi->nm", away, away)
+    np.fill_diagonal(square, 1.0)
+    return np.asarray(np.einsum("nmi,nm->ni", away, _REPULSION / square**1.5))
 
 
 @dataclass
@@ -230,9 +249,11 @@ class Unfolding:
     def _load(self) -> None:
         """Make the model of the rig with what is carved now."""
         boxes, voxels = cell_boxes(self.tree, self.carved)
+        end = self.tree.fold_angles
         self._model = rig_model(
-            self.tree, boxes, time_step=_TIME_STEP, density=1.0, damping=_HINGE_DRAG
-        )
+            self.tree, boxes, time_step=_TIME_STEP, density=1.0, damping=_HINGE_DRAG,
+            limits_deg=(np.minimum(end, 0.0), np.maximum(end, 0.0)),
+        )  # fmt: skip
         model, hinges = self._model, self.tree.hinges
         # The compiler numbers bodies depth first: ask for places by name.
         self._joint = np.array([int(model.joint(h.name).qposadr[0]) for h in hinges], dtype=int)
@@ -264,7 +285,7 @@ class Unfolding:
         for shape, other in (("A", "B"), ("B", "A")):
             copy, place = self._copies[shape], places[shape]
             drawn = _ATTRACTION * (places[other] - place)
-            force = drawn if attract else self._repulsion(place)
+            force = drawn if attract else repulsion(place)
             force -= _DRAG * (place - copy.place) / _TIME_STEP
             for voxel, push in copy.pushes.items():
                 force[voxel] += push
@@ -282,13 +303,6 @@ class Unfolding:
         self._steps += 1
         if self._steps % _EVERY == 0:
             self._record()
-
-    def _repulsion(self, place: F64) -> F64:
-        """Force on every voxel, (n, 3): ∝ 1/r² from each voxel of another body."""
-        away = place[:, None] - place[None, :]
-        square = np.einsum("nmi,nmi->nm", away, away)
-        np.fill_diagonal(square, 1.0)
-        return np.asarray(np.einsum("nmi,nm->ni", away, _REPULSION / square**1.5))
 
     def _carve(self, action: Carve) -> None:
         self.carved.add(action.voxel)

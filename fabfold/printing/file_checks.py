@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,6 @@ _POINTS, _LOOK = 6_000, 10.0
 _RIM = 0.01
 #: Parts that would be too many to measure every pair of.
 _MOST_PARTS = 500
-#: Grams a cubic centimetre, by the first word of a profile's material.
-_DENSITY: Final[dict[str, float]] = {"PLA": 1.24, "PETG": 1.27, "PA12": 1.01}
 
 
 def parts_of(path: Path) -> tuple[list[BodyMesh], list[float]]:
@@ -254,7 +252,7 @@ def _extent(parts: Sequence[BodyMesh], profile: Profile) -> Check:
 def _material(parts: Sequence[BodyMesh], profile: Profile) -> Check:
     volume = sum(part.volume for part in parts) / 1000.0
     material = profile.material or "material"
-    grams = volume * _DENSITY.get(material.split()[0], 1.15)
+    grams = volume * profile.density_g_cm3
     return Check(
         "material", volume, None, "cm³", True,
         f"{len(parts)} parts; {grams:.0f} g of {material} if solid",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -130,6 +130,16 @@ class Profile(BaseModel):
                 f"({self.clearance_mm:g}): the printer needs some of the gap for itself"
             )
         return self
+
+    @property
+    def density_g_cm3(self) -> float:
+        """Weight of the material, g/cm³."""
+        words = self.material.split()
+        return _DENSITY.get(words[0] if words else "", 1.15)
+
+
+#: Grams a cubic centimetre, by the first word of a profile's material; resins are about 1.15.
+_DENSITY: Final[dict[str, float]] = {"PLA": 1.24, "PETG": 1.27, "PA12": 1.01}
 
 
 def profiles_folder() -> Path:

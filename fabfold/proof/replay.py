@@ -9,8 +9,9 @@ proof is :mod:`fabfold.proof.certify`, the independent opinion :mod:`fabfold.pro
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,10 @@ from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import WHOLE, unpacked
 from fabfold.tree.system import hinge_system
 
-__all__ = ["ReplayReport", "material_boxes", "replay"]
+if TYPE_CHECKING:
+    import mujoco
+
+__all__ = ["ReplayReport", "course", "material_boxes", "replay", "require_finite"]
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
@@ -170,6 +174,49 @@ def _carved_voxels(tree: FoldTree, motion: Motion) -> set[int]:
     }
 
 
+def course(
+    motion: Motion, seconds_per_quarter: float, time_step: float
+) -> Iterator[tuple[int, F64, F64 | None]]:
+    """Angles that motors follow, speeding up and slowing down smoothly in every move.
+
+    Parameters
+    ----------
+    motion : Motion
+        The path.
+    seconds_per_quarter : float
+        For 90°, seconds.
+    time_step : float
+        Seconds.
+
+    Yields
+    ------
+    number : int
+        Of the move, from 1.
+    goal : (h,) float64 array
+        Angles, radians.
+    rate : (h,) float64 array or None
+        Their speed, rad/s; None once after each move, with the angles that it ends at.
+    """
+    for number in range(1, len(motion.moves)):
+        start, end = np.radians(motion.angles_deg[number - 1 : number + 1])
+        quarters = float(np.abs(end - start).max() / (np.pi / 2))
+        count = max(1, round(seconds_per_quarter * quarters / time_step))
+        for step in range(1, count + 1):
+            share = step / count
+            rate = 30.0 * (share * (1.0 - share)) ** 2 / (count * time_step)
+            share = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+            yield number, start + (end - start) * share, (end - start) * rate
+        yield number, end, None
+
+
+def require_finite(data: mujoco.MjData, where: str) -> None:
+    """Raise :class:`CheckError` where a simulation diverged, saying where that was."""
+    if not np.isfinite(data.qpos).all():
+        raise CheckError(
+            f"replay: the simulation diverged in {where}; the bodies press against each other"
+        )
+
+
 def replay(
     tree: FoldTree,
     motion: Motion,
@@ -230,30 +277,20 @@ def replay(
     deepest = 0.0
     touching = steps = 0
     moves = len(motion.moves) - 1
-    for number in range(1, moves + 1):
-        progress.update((number - 1) / moves, f"replaying move {number} of {moves}")
-        start, end = np.radians(motion.angles_deg[number - 1 : number + 1])
-        quarters = float(np.abs(end - start).max() / (np.pi / 2))
-        count = max(1, round(seconds_per_quarter * quarters / _TIME_STEP))
-        for step in range(1, count + 1):
-            share = step / count
-            rate = 30.0 * (share * (1.0 - share)) ** 2 / (count * _TIME_STEP)
-            share = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-            goal = start + (end - start) * share
-            # The motor brakes by its own damping; ask for a little more, to be there on time.
-            data.ctrl[motor] = goal + (end - start) * rate * (_BRAKE + _DAMPING) / _GAIN
-            mujoco.mj_step(model, data)
-            steps += 1
-            lag = max(lag, float(np.abs(data.qpos[joint] - goal).max(initial=0.0)))
-            if data.ncon:
-                touching += 1
-                deepest = max(deepest, -float(data.contact.dist.min()))
-        worst = max(worst, float(np.abs(data.qpos[joint] - end).max(initial=0.0)))
-        if not np.isfinite(data.qpos).all():
-            raise CheckError(
-                f"replay: the simulation diverged in move {number} of {moves}; "
-                "the bodies press against each other"
-            )
+    for number, goal, rate in course(motion, seconds_per_quarter, _TIME_STEP):
+        if rate is None:
+            worst = max(worst, float(np.abs(data.qpos[joint] - goal).max(initial=0.0)))
+            require_finite(data, f"move {number} of {moves}")
+            progress.update(number / moves, f"replayed move {number} of {moves}")
+            continue
+        # The motor brakes by its own damping; ask for a little more, to be there on time.
+        data.ctrl[motor] = goal + rate * (_BRAKE + _DAMPING) / _GAIN
+        mujoco.mj_step(model, data)
+        steps += 1
+        lag = max(lag, float(np.abs(data.qpos[joint] - goal).max(initial=0.0)))
+        if data.ncon:
+            touching += 1
+            deepest = max(deepest, -float(data.contact.dist.min()))
     angles = np.degrees(data.qpos[joint])
     progress.update(1.0, f"deepest contact {deepest * voxel_mm:.3f} mm")
     links = sum(body.edge is not None for body in tree.bodies)
