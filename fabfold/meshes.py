@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "box_triangles",
     "compact",
     "drop_collapsed",
     "face_areas",
@@ -220,3 +221,26 @@ def mesh_volume(vertices: NDArray[np.float64], faces: NDArray[np.integer[Any]]) 
         In the cube of the unit of `vertices`; negative if the mesh is inside out.
     """
     return float(triple_products(vertices[faces] - vertices.mean(axis=0)).sum() / 6)
+
+
+def box_triangles(
+    low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """A box as a closed mesh.
+
+    Parameters
+    ----------
+    low, high : (3,) float64 array
+        Two opposite corners.
+
+    Returns
+    -------
+    vertices : (8, 3) float64 array
+        Its corners.
+    faces : (12, 3) int32 array
+        Counter-clockwise seen from outside.
+    """
+    bits = (np.arange(8)[:, None] >> np.array([2, 1, 0])) & 1
+    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    faces = [(q[0], q[i], q[i + 1]) for q in quads for i in (1, 2)]
+    return np.where(bits, high, low).astype(float), np.array(faces, dtype=np.int32)

@@ -356,6 +356,36 @@ def rehearse(
     show_rehearsal(found, built.planned.tree, as_json=as_json)
 
 
+@app.command()
+@_guarded
+def studio(
+    source: Annotated[
+        str, typer.Argument(metavar="KIT|MODEL", help="A kit folder, a model file or sample:NAME.")
+    ],
+    output: Output = None,
+    port: Annotated[
+        int, typer.Option("--port", min=0, max=65535, help="Default: any that is free.")
+    ] = 0,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
+    ] = True,
+) -> None:
+    """Look at a kit and change it on a page, served to this machine only."""
+    import webbrowser
+
+    from fabfold.studio.serve import serve
+
+    served = serve(source, None if output is None else str(output), port)
+    try:
+        typer.echo(f"studio: {served.gate.address}\nCtrl-C ends it; every step is kept in the kit.")
+        sys.stdout.flush()
+        if browser:
+            webbrowser.open(served.gate.address)
+        served.page.tasks.run()
+    finally:
+        served.close()
+
+
 @app.command("list")
 @_guarded
 def list_things(

@@ -93,6 +93,8 @@ class Kit(StageRunner):
         self.scheduler = scheduler
         self.seconds = seconds
         self._accepted = False
+        #: Told of each better tree that a search finds, with its voxels.
+        self.on_better: Callable[[Found], None] | None = None
         self._early: EarlyKit | None = None
         self._compiler: KernelCompiler | None = None
         self._files = {"model": model, "template": template, "actions": actions}
@@ -316,6 +318,16 @@ class Kit(StageRunner):
             if stage != "check" or not self.delivered():
                 write_stage(self, stage, result)
 
+    def has_path(self) -> bool:
+        """Whether a tree with its path was made for this recipe."""
+        key = keys.fold_key(self.recipe, self._template, self._mark())
+        return self._is_done("fold", key)
+
+    def has_bodies(self) -> bool:
+        """Whether the printed bodies were made for this recipe."""
+        key = keys.join_key(self.recipe, self._template, self.print_mode(), self._mark())
+        return self._is_done("join", key)
+
     def delivered(self) -> list[Check]:
         """Check of the files of an exported kit against what was built; none before an export."""
         from fabfold.kit.delivered import delivered_checks
@@ -383,6 +395,7 @@ class Kit(StageRunner):
             wishes=self.wishes(),
             shift=shift,
             on_first=on_first,
+            on_better=self.on_better,
             compiler=self._compiler,
         )
 
@@ -410,14 +423,9 @@ class Kit(StageRunner):
         return box_closure(self.recipe, self._template, planned)
 
     def pareto(self) -> list[Solution]:
-        """Trees that fold of which none is better than another in every respect.
+        """Trees that fold, none better than another in every respect, as :meth:`fit` raises.
 
         They are numbered from 1, fewest joints first; the recipe's `pick` goes on with one of them.
-
-        Raises
-        ------
-        NoTreeError, NoFoldError
-            If no round of the recipe finds a tree that folds.
         """
         from fabfold.search.pareto import solutions
 

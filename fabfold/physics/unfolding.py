@@ -187,7 +187,13 @@ class Unfolding:
 
     # What can be done -----------------------------------------------------------------------
 
-    def do(self, action: Action, watch: Callable[[int, int], None] | None = None) -> None:
+    def do(
+        self,
+        action: Action,
+        watch: Callable[[int, int], None] | None = None,
+        *,
+        joined: bool = False,
+    ) -> None:
         """Do one action, and record it.
 
         Parameters
@@ -196,6 +202,8 @@ class Unfolding:
             What to do.
         watch : callable, optional
             Hears of each hundredth time step: how many are done, and of how many.
+        joined : bool
+            Record more steps of the same force as one action with those before.
 
         Raises
         ------
@@ -207,8 +215,12 @@ class Unfolding:
             raise RecipeError(
                 f"actions: there is no voxel {voxel}; this kit has 0 to {len(self.tree.source) - 1}"
             )
-        self._snapshots.append(self._snapshot())
-        self.actions.append(action)
+        last = self.actions[-1] if self.actions and joined else None
+        if isinstance(action, Unfold | Match) and last is not None and last.do == action.do:
+            self.actions[-1] = action.model_copy(update={"steps": last.steps + action.steps})
+        else:
+            self._snapshots.append(self._snapshot())
+            self.actions.append(action)
         if isinstance(action, Unfold | Match):
             for step in range(action.steps):
                 self._step(attract=isinstance(action, Match))

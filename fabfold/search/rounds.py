@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from fabfold.errors import NoFoldError, NoTreeError
@@ -18,7 +18,7 @@ from fabfold.recipe.recipe_wishes import wished
 from fabfold.search.kernels import KernelCompiler
 from fabfold.search.run import Budget, Tally, executor, require_fit, run_seeds, warm_up
 from fabfold.search.saved import SeedCache
-from fabfold.search.schedule import SEEDS_PER_ROUND, Rung, schedule
+from fabfold.search.schedule import SEEDS_PER_ROUND, Rung, SeedTask, schedule
 from fabfold.search.seeds import Batch, Event, Executor, Job, SeedResult
 from fabfold.search.voxelization_problems import VoxelizationProblems
 from fabfold.store import StageStore, stage_key
@@ -39,18 +39,6 @@ SEED_STRIDE = 1_000_000
 
 #: A tree that folds, and the voxels that it joins.
 Found = tuple[Voxels, Candidate]
-
-
-@dataclass(frozen=True)
-class _Task:
-    """One seed: its number, digest, voxelization, round, effort, and the tree to go on from."""
-
-    seed: int
-    key: str
-    option: int
-    number: int
-    effort: Effort
-    start: Candidate | None
 
 
 class Rounds:
@@ -83,6 +71,8 @@ class Rounds:
         Added to the number of each seed, for searches that run beside one another.
     on_first : callable, optional
         Told of the first tree that folds, with its voxels, as soon as its rung is done.
+    on_better : callable, optional
+        Told of each tree that is better than all before, with its voxels, as soon as it is known.
     compiler : KernelCompiler, optional
         Compiles the kernels beside what comes before; the search waits for it.
     """
@@ -102,6 +92,7 @@ class Rounds:
         wishes: Wishes | None = None,
         shift: int = 0,
         on_first: Callable[[Found], None] | None = None,
+        on_better: Callable[[Found], None] | None = None,
         compiler: KernelCompiler | None = None,
     ) -> None:
         self.recipe = recipe
@@ -116,6 +107,7 @@ class Rounds:
         self._cache = SeedCache(store)
         self._open_progress = open_progress
         self._on_first = on_first
+        self._on_better = on_better
         self._compiler = compiler
         self._option_of: dict[int, int] = {}
         self._origin: dict[int, int] = {}
@@ -324,7 +316,10 @@ class Rounds:
                 found: dict[int, SeedResult] = found,
             ) -> None:
                 event = self._cache.keep(event, keys[event.seed], budget.seconds or 0.0)
+                best = tally.best
                 tally.on_event(event)
+                if tally.best is not None and tally.best is not best:
+                    self._tell_better(tally.best)
                 if event.seed in tally.results:
                     found[event.seed] = tally.results[event.seed]
 
@@ -337,6 +332,11 @@ class Rounds:
             if budget.over() or rung.is_last(before, _best(results)):
                 break
         return results
+
+    def _tell_better(self, candidate: Candidate) -> None:
+        option = self._option_of.get(candidate.seed)
+        if self._on_better is not None and option is not None:
+            self._on_better((self.problems.options[option], candidate))
 
     def _held(self, number: int, whole: bool = False) -> dict[int, SeedResult]:
         """Results of a round that earlier runs left; with `whole` those that ran to their end."""
@@ -364,7 +364,7 @@ class Rounds:
                 break
         return True
 
-    def _tasks(self, number: int, place: int, results: Mapping[int, SeedResult]) -> list[_Task]:
+    def _tasks(self, number: int, place: int, results: Mapping[int, SeedResult]) -> list[SeedTask]:
         """What the seeds of one rung search, given the results of those before."""
         rungs = self._rungs(number)
         rung = rungs[place]
@@ -414,7 +414,7 @@ class Rounds:
         option: int,
         effort: Effort,
         start: Candidate | None = None,
-    ) -> _Task:
+    ) -> SeedTask:
         recipe = self.recipe
         self._option_of[seed] = option
         about: list[Any] = [recipe.surface_weight, recipe.single_weight, self._carves(number)]
@@ -422,9 +422,9 @@ class Rounds:
         if start is not None:
             self._origin[seed] = start.seed
             about += [start.tree.to_json(1.0, (0.0, 0.0, 0.0)), start.path.tolist()]
-        return _Task(seed, stage_key(self._key, *about, seed), option, number, effort, start)
+        return SeedTask(seed, stage_key(self._key, *about, seed), option, number, effort, start)
 
-    def _work(self, task: _Task) -> Job | SeedResult:
+    def _work(self, task: SeedTask) -> Job | SeedResult:
         """What a seed searches, or its result where its voxelization rules every tree out."""
         job = self.problems.job(task.option, task.seed)
         if isinstance(job, SeedResult):
@@ -453,7 +453,7 @@ class Rounds:
         whole = {s: r for s, r in self._cache.known(keys).items() if r.cut is None}
         return Batch(keys, whole)
 
-    def _batch_tasks(self, number: int) -> list[_Task]:
+    def _batch_tasks(self, number: int) -> list[SeedTask]:
         return [task for place in (0, 1) for task in self._tasks(number, place, {})]
 
     def keep(self, event: Event, key: str) -> None:

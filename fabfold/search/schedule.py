@@ -12,9 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from fabfold.tree.candidate import Candidate
 from fabfold.tree.effort import EFFORTS, Effort
 
-__all__ = ["SEEDS_PER_ROUND", "Rung", "schedule"]
+__all__ = ["SEEDS_PER_ROUND", "Rung", "SeedTask", "schedule"]
 
 #: Numbers that a round keeps for its seeds; a constant, so that rounds of any effort keep theirs.
 SEEDS_PER_ROUND = 100
@@ -93,3 +94,15 @@ def schedule(effort: str, number: int) -> tuple[Rung, ...]:
     if number == 0:
         return (first, *others)
     return (replace(first, seeds=4, options=4), *others)
+
+
+@dataclass(frozen=True)
+class SeedTask:
+    """One seed: its number, digest, voxelization, round, effort, and the tree to go on from."""
+
+    seed: int
+    key: str
+    option: int
+    number: int
+    effort: Effort
+    start: Candidate | None
