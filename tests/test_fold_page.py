@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from browsers import chromium
 
 from fabfold.export.glb import pivots_mm
 from fabfold.guide.fold_steps import turned
@@ -15,21 +15,11 @@ from fabfold.guide.manual import plan_steps
 
 pytestmark = pytest.mark.slow
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-#: Software graphics: there is no card.
-OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
-OPTIONS += ["--enable-unsafe-swiftshader"]
-
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    if CHROMIUM is None:
-        pytest.skip("Chromium is not installed")
-    api = pytest.importorskip("playwright.sync_api")
-    with api.sync_playwright() as play:
-        opened = play.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+    with chromium() as opened:
         yield opened
-        opened.close()
 
 
 @pytest.fixture

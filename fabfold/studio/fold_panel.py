@@ -167,15 +167,28 @@ class FoldPanel:
             time.sleep(1.0 / _RATE)
             now = time.monotonic()
             passed, then = now - then, now
-            motion = self._motion
-            if not self._playing or motion is None:
-                continue
-            last = len(motion.moves) - 1
-            moment = self.moment + passed * float(self._pace.value)
-            if moment >= last:
-                self._playing = self._loop
-                moment = float(last) if not self._loop or self.moment < last else 0.0
-            self.set_moment(moment)
+            with self._lock:
+                self._advance(passed)
+
+    def _advance(self, seconds: float) -> None:
+        motion = self._motion
+        if not self._playing or motion is None:
+            return
+        last = len(motion.moves) - 1
+        moment = self.moment + seconds * float(self._pace.value)
+        if moment >= last:
+            self._playing = self._loop
+            moment = float(last) if not self._loop or self.moment < last else 0.0
+        self.set_moment(moment)
+
+    def forget(self, title: str) -> None:
+        """Show no kit, and say why."""
+        with self._lock:
+            self._playing, self._motion = False, None
+            self._scene.clear()
+            self._title.content = title
+            self._hinges.content = ""
+            self._about.content = ""
 
     def _tell(self, moment: float) -> None:
         """Table of hinges and name of the move, not at every picture."""

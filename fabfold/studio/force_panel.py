@@ -184,8 +184,9 @@ class ForcePanel:
         carved = f", {len(unfolding.carved)} voxels carved" if unfolding.carved else ""
         if unfolding.met:
             return f"A and B have met{carved}: use this path"
+        count = len(unfolding.actions)
         return (
-            f"{len(unfolding.actions)} actions{carved}; A and B are up to "
+            f"{count} action{'' if count == 1 else 's'}{carved}; A and B are up to "
             f"{unfolding.difference_deg:.0f}° apart"
         )
 

@@ -87,6 +87,8 @@ class KitScene:
         self._picked: frozenset[int] = frozenset()
         self._angles: F64 = np.zeros(0)
         self._visible = True
+        self._middle = np.zeros(3)
+        #: Where the middle of shape A is in the scene.
         self.shift = np.zeros(3)
         #: Told of the body, and the ray of the click, where one is clicked.
         self.on_body: Callable[[int, F64, F64], None] | None = None
@@ -124,6 +126,7 @@ class KitScene:
         self.clear()
         self._tree = tree
         self._picked = frozenset()
+        self._middle = np.asarray(tree.source.mean(axis=0))
         self._colours = [tuple(int(c) for c in row) for row in body_colours(tree)]  # type: ignore[misc]
         for index, (vertices, faces) in enumerate(meshes):
             handle = self._server.scene.add_mesh_simple(
@@ -179,7 +182,7 @@ class KitScene:
         self._angles = np.asarray(angles_deg, dtype=float)
         poses = self._tree.body_poses(self._angles)
         turns = Rotation.from_matrix(poses[:, :3, :3]).as_quat()[:, (3, 0, 1, 2)]
-        places = poses[:, :3, 3] + self.shift
+        places = poses[:, :3, 3] + self.shift - self._middle
         with self._server.atomic():
             for handle, turn, place in zip(self._bodies, turns, places, strict=True):
                 handle.wxyz = turn
@@ -206,7 +209,7 @@ class KitScene:
         if self._tree is None or not self._tree.bodies[body].voxels:
             return None
         pose = self._tree.body_poses(self._angles)[body]
-        here = pose[:3, :3].T @ (start - self.shift - pose[:3, 3])
+        here = pose[:3, :3].T @ (start - self.shift + self._middle - pose[:3, 3])
         way = pose[:3, :3].T @ along
         best: tuple[float, int] | None = None
         for voxel in self._tree.bodies[body].voxels:

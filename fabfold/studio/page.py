@@ -32,7 +32,10 @@ if TYPE_CHECKING:
 __all__ = ["StudioPage", "bodies_named"]
 
 #: Views of the scene, and what is seen in each.
-_VIEWS = ("Kit", "Model", "Forces")
+_VIEWS = ("Kit", "Model", "Grid", "Forces")
+
+#: Where one looks from.
+_CAMERA = (6.5, -7.5, 5.5)
 
 
 def bodies_named(text: str, names: list[str]) -> list[int]:
@@ -55,6 +58,7 @@ class StudioPage:
     def __init__(self, server: viser.ViserServer, steps: StudioSteps) -> None:
         self._server, self._steps = server, steps
         self._solid_voxels = 0.0
+        self._far = False
         self._checks: list[Check] = []
         gui: Any = server.gui
         gui.configure_theme(
@@ -67,7 +71,7 @@ class StudioPage:
         )
         gui.set_panel_label(f"fabfold: {steps.recipe.name}")
         server.scene.set_up_direction("+z")
-        server.initial_camera.position = (6.5, -7.5, 5.5)
+        server.initial_camera.position = _CAMERA
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         self.tasks = PageTasks(server)
         self._view = gui.add_button_group("view", _VIEWS)
@@ -126,12 +130,18 @@ class StudioPage:
     # What is seen -------------------------------------------------------------------------------
 
     def set_view(self, name: str) -> None:
-        """Show the kit, the model with its grid and regions, or the two copies of the forces."""
+        """Show the kit, the model with its regions or its grid, or the two copies of the forces."""
         self.scene.set_visible(name == "Kit")
-        self.model.set_visible(name == "Model")
-        self.grid.set_visible(name == "Model")
+        self.model.set_visible(name in ("Model", "Grid"))
+        self.grid.set_visible(name == "Grid")
         self.wishes.set_visible(name == "Model")
         self.forces.set_visible(name == "Forces")
+        if (name == "Forces") != self._far:
+            self._far = name == "Forces"
+            away = 2.2 if self._far else 1.0
+            for client in self._server.get_clients().values():
+                client.camera.position = away * np.array(_CAMERA)
+                client.camera.look_at = (0.0, 0.0, 0.0)
 
     def begin(self) -> None:
         """Read the model, and show what the kit has already."""
@@ -141,10 +151,23 @@ class StudioPage:
         recipe = self._steps.recipe
         self.grid.begin(recipe.rotation, recipe.origin, recipe.pitch)
         self._refresh()
-        if kit.has_path():
-            self._show_planned()
+        self._show_kit()
+
+    def _show_kit(self) -> None:
+        """Show what there is of the recipe that counts now, without making anything."""
+        kit = self._kit()
+        self._checks = []
+        self._verdict.content = "Not checked yet."
         if kit.has_bodies():
             self.build()
+        elif kit.has_path():
+            self._show_planned()
+            self.set_view("Kit")
+        else:
+            self._solid_voxels = 0.0
+            self.forces.close()
+            self.fold.forget("No tree for this recipe yet: search for one.")
+            self.set_view("Model")
 
     def change(self, title: str, **fields: Any) -> None:
         """Change the recipe, and say so where it cannot be."""
@@ -154,6 +177,7 @@ class StudioPage:
             self.tasks.say(f"**{escaped(title)}:** {escaped(str(error))}")
             return
         self._refresh()
+        self.tasks.start(title, self._show_kit)
 
     def _use_grid(self, rotation: Any, origin: Any, pitch: Any) -> None:
         title = "grid by the search" if pitch is None else "grid by hand"
@@ -162,6 +186,7 @@ class StudioPage:
     def _use_actions(self, actions: list[Any]) -> None:
         self._steps.fold_by_forces(actions)
         self._refresh()
+        self._kit().run("fold")
         self._show_planned()
         self.set_view("Kit")
 
@@ -171,6 +196,7 @@ class StudioPage:
             self.tasks.say(f"There is nothing to {way}.")
             return
         self._refresh()
+        self.tasks.start(way.capitalize(), self._show_kit)
 
     def _refresh(self) -> None:
         """Show the recipe in all controls."""
@@ -270,7 +296,8 @@ class StudioPage:
     def _taker(self, number: int) -> Callable[[Any], None]:
         def take(_: Any) -> None:
             def work() -> None:
-                self.change(f"solution {number}", pick=number)
+                self._steps.change(f"solution {number}", pick=number)
+                self._refresh()
                 self._kit().run("fold")
                 self._show_planned()
                 self.set_view("Kit")

@@ -177,8 +177,8 @@ class StudioSteps:
         if not steps or any((s.recipe.model, s.recipe.sha256) != model for s in steps):
             return
         self.steps, self.place = steps, min(max(place, 0), len(steps) - 1)
-        if self._start.recipe != self.recipe:
-            # The recipe was changed elsewhere since: that is the newest step.
+        if all(step.recipe != self._start.recipe for step in steps):
+            # kit.toml was changed elsewhere since: that is the newest step.
             self.change("changed outside the studio", **self._start.recipe.model_dump())
 
 

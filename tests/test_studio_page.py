@@ -1,0 +1,184 @@
+"""``fabfold studio`` as a person uses it: the command, and its page in a real browser."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from browsers import chromium
+
+from fabfold.kit.kit import open_kit
+
+pytestmark = pytest.mark.slow
+
+WAIT_MS = 60_000
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as opened:
+        yield opened
+
+
+@pytest.fixture
+def studio(bar_kit: Any, tmp_path: Any, browser: Any) -> Iterator[Any]:
+    """The page of a copy of the bar's kit, with its folder; what it says and asks for is kept."""
+    folder = tmp_path / "bar-kit"
+    shutil.copytree(bar_kit.folder, folder)
+    command = [sys.executable, "-m", "fabfold", "studio", str(folder), "--no-browser"]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert run.stdout is not None
+    line = run.stdout.readline()
+    address = re.search(r"http://127\.0\.0\.1:\d+/\?token=\S+", line)
+    assert address is not None, line
+    page = browser.new_page(viewport={"width": 1300, "height": 850})
+    page.said, page.asked = [], []
+    page.on("pageerror", lambda error: page.said.append(str(error)))
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.on("websocket", lambda socket: page.asked.append(socket.url))
+    page.goto(address[0])
+    page.get_by_text("Opening: done.").wait_for(timeout=WAIT_MS)
+    yield page, folder, address[0]
+    page.close()
+    run.send_signal(signal.SIGINT)
+    assert run.wait(timeout=30) == 130
+    assert page.said == []
+    here = address[0].split("/?")[0].removeprefix("http://")
+    for url in page.asked:
+        assert re.match(rf"(blob:)?(http|ws)://{re.escape(here)}/|data:", url), url
+
+
+def picture(page: Any) -> np.ndarray:
+    """What the scene shows: pixels left of the panel."""
+    import io
+
+    from PIL import Image
+
+    page.wait_for_timeout(1500)
+    shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    return np.asarray(shot)[:, :920].astype(int)
+
+
+def coloured(pixels: np.ndarray) -> int:
+    """Pixels of clear colour."""
+    return int((pixels.max(axis=2) - pixels.min(axis=2) > 40).sum())
+
+
+def press(page: Any, name: str) -> None:
+    page.get_by_role("button", name=name, exact=True).click()
+
+
+def tab(page: Any, name: str) -> None:
+    page.get_by_role("tab", name=name, exact=True).click()
+
+
+def test_it_is_scrubbed_and_stepped_and_bodies_are_clicked(studio: Any) -> None:
+    page, _, _ = studio
+    closed = picture(page)
+    assert coloured(closed) > 10_000
+    press(page, "B")
+    box = picture(page)
+    assert (np.abs(box - closed).max(axis=2) > 40).sum() > 5_000
+    press(page, "◀")
+    assert page.get_by_text(re.compile(r"Move \d of \d")).is_visible()
+    press(page, "A")
+    again = picture(page)
+    assert (np.abs(again - closed).max(axis=2) > 40).sum() < 500
+    # A click in the middle of the bar meets a body, and greys the others.
+    rows, columns = np.nonzero(closed.max(axis=2) - closed.min(axis=2) > 40)
+    page.mouse.click(int(np.median(columns)), int(np.median(rows)))
+    page.get_by_text(re.compile(r"body-\d\d: \d voxels, voxel \d clicked")).wait_for(
+        timeout=WAIT_MS
+    )
+    assert coloured(picture(page)) < coloured(closed)
+
+
+def test_a_region_is_painted_and_undone(studio: Any) -> None:
+    page, folder, _ = studio
+    tab(page, "Wish")
+    press(page, "Model")
+    page.get_by_text("brush", exact=True).click()
+    page.wait_for_timeout(500)
+    page.mouse.click(460, 425)
+    page.get_by_text(re.compile(r"protected: sphere\(")).wait_for(timeout=WAIT_MS)
+    kept = (folder / "stages" / "studio.json").read_text(encoding="utf-8")
+    assert "sphere(" in kept
+    page.get_by_text("Steps").click()
+    press(page, "undo")
+    page.get_by_text("nothing protected").wait_for(timeout=WAIT_MS)
+
+
+def test_a_grid_is_placed_by_hand_and_searched(studio: Any) -> None:
+    page, folder, _ = studio
+    tab(page, "Grid")
+    press(page, "Grid")
+    page.get_by_text(re.compile(r"\d+ cells for 8")).wait_for(timeout=WAIT_MS)
+    for place, value in ((6, "10"), (3, "5")):  # pitch, and the origin along x
+        page.locator("input").filter(visible=True).nth(place).fill(value)
+        page.keyboard.press("Enter")
+    page.get_by_text(re.compile(r"8 cells for 8, 8 full")).wait_for(timeout=WAIT_MS)
+    press(page, "Use this grid")
+    page.get_by_text("grid by hand: done.").wait_for(timeout=WAIT_MS)
+    tab(page, "Search")
+    press(page, "Search")
+    page.get_by_text("Search: done.").wait_for(timeout=WAIT_MS)
+    assert page.get_by_text(
+        re.compile(r"\d hinges, \d moves, box closed to \d+ %")
+    ).first.is_visible()
+    recipe = open_kit(str(folder)).recipe
+    assert recipe.pitch == 10.0
+    assert len(open_kit(str(folder)).fold().tree.hinges) >= 1
+
+
+def test_forces_fold_it_with_a_persons_help(studio: Any) -> None:
+    page, folder, _ = studio
+    before = open_kit(str(folder)).fold().motion
+    tab(page, "Force")
+    press(page, "Begin")
+    press(page, "Forces")
+    page.get_by_text("0 actions; A and B are up to 180° apart").wait_for(timeout=WAIT_MS)
+    shown = picture(page)
+    rows, columns = np.nonzero(shown.max(axis=2) - shown.min(axis=2) > 40)
+    left = columns < np.median(columns)
+    page.mouse.click(int(np.median(columns[left])), int(np.median(rows[left])))
+    page.get_by_text(re.compile(r"Voxel \d of A chosen")).wait_for(timeout=WAIT_MS)
+    press(page, "push")
+    press(page, "carve")
+    press(page, "unfold")
+    page.get_by_text("Unfolding: done.").wait_for(timeout=WAIT_MS)
+    assert (np.abs(picture(page) - shown).max(axis=2) > 40).sum() > 5_000
+    press(page, "Release pushes and pins")
+    press(page, "match")
+    page.get_by_text(re.compile(r"A and B have met")).wait_for(timeout=WAIT_MS)
+    press(page, "Use this path")
+    page.get_by_text("Path: done.").wait_for(timeout=WAIT_MS)
+    opened = open_kit(str(folder))
+    assert opened.recipe.method == "physics"
+    assert np.allclose(opened.fold().motion.angles_deg[-1], before.angles_deg[-1])
+
+
+def test_it_is_checked_and_exported(studio: Any) -> None:
+    page, folder, _ = studio
+    shutil.rmtree(folder / "bodies")
+    tab(page, "Size")
+    assert page.get_by_text(re.compile(r"Box 40 × 40 × 40 mm")).is_visible()
+    tab(page, "Check")
+    press(page, "Export the kit")
+    page.get_by_text(re.compile(r"Export: done\.")).wait_for(timeout=WAIT_MS)
+    assert page.get_by_text(re.compile(r"All \d+ passed")).is_visible()
+    assert len(list((folder / "bodies").iterdir())) == len(open_kit(str(folder)).fold().tree.bodies)
+
+
+def test_without_the_key_there_is_no_page(studio: Any, browser: Any) -> None:
+    _, _, address = studio
+    stranger = browser.new_context().new_page()
+    answer = stranger.goto(address.split("?")[0])
+    assert answer.status == 403
+    stranger.close()
