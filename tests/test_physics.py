@@ -19,15 +19,15 @@ from fabfold.fold.lattice_planner import count_free_moves
 from fabfold.physics.actions import (
     Carve,
     Match,
-    Pin,
+    PinVoxel,
     Push,
     Release,
     Unfold,
     actions_json,
     read_actions,
 )
+from fabfold.physics.forced_path import physics_path
 from fabfold.physics.lattice_path import lattice_path, steps_of
-from fabfold.physics.solve import physics_path
 from fabfold.physics.unfolding import Unfolding, cell_boxes, repulsion
 from fabfold.tree.effort import Effort
 from fabfold.tree.solve import solve
@@ -103,7 +103,7 @@ def test_the_path_is_free_and_ends_in_the_box():
 
 def test_a_pinned_body_stays_and_a_pushed_one_goes():
     alone, pinned, pushed = (Unfolding(strip()) for _ in range(3))
-    pinned.do(Pin(shape="B", voxel=7))
+    pinned.do(PinVoxel(shape="B", voxel=7))
     pushed.do(Push(shape="A", voxel=7, force=(0.0, 60.0, 0.0)))
     for unfolding in (alone, pinned, pushed):
         unfolding.do(Unfold(steps=400))
@@ -142,7 +142,7 @@ def test_undo_takes_back_each_action():
     unfolding.do(Unfold(steps=300))
     records, angles = len(unfolding.way_deg("A")), unfolding.angles_deg("B")
     unfolding.do(Carve(voxel=2))
-    unfolding.do(Pin(shape="A", voxel=4))
+    unfolding.do(PinVoxel(shape="A", voxel=4))
     unfolding.do(Unfold(steps=200))
     assert not np.allclose(unfolding.angles_deg("B"), angles)
     for _ in range(3):
@@ -206,14 +206,14 @@ def test_what_cannot_meet_is_told():
     with pytest.raises(NoFoldError, match="A and B do not meet: a hinge stands 180°"):
         physics_path(tree, [Unfold(steps=1)])
     with pytest.raises(RecipeError, match="there is no voxel 8; this kit has 0 to 7"):
-        physics_path(tree, [Pin(shape="A", voxel=8)])
+        physics_path(tree, [PinVoxel(shape="A", voxel=8)])
 
 
 def test_actions_come_back_from_their_file(tmp_path):
     actions = (
         Unfold(steps=10),
         Push(shape="A", voxel=1, force=(0.0, 1.5, -2.0)),
-        Pin(shape="B", voxel=0),
+        PinVoxel(shape="B", voxel=0),
         Carve(voxel=3),
         Release(shape="A"),
         Match(steps=20),
@@ -278,8 +278,8 @@ def test_a_wrong_turn_does_not_meet():
     stuck = replace(tree)
     unfolding = Unfolding(stuck)
     for voxel in range(8):
-        unfolding.do(Pin(shape="A", voxel=voxel))
-        unfolding.do(Pin(shape="B", voxel=voxel))
+        unfolding.do(PinVoxel(shape="A", voxel=voxel))
+        unfolding.do(PinVoxel(shape="B", voxel=voxel))
     unfolding.do(Match(steps=300))
     assert not unfolding.met
     assert unfolding.difference_deg > 150

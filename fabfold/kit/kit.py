@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from fabfold.errors import KitError, RecipeError
 from fabfold.files import sha256_of, write_text
@@ -116,15 +116,7 @@ class Kit(StageRunner):
         seconds: float | None = None,
         **options: Any,
     ) -> Kit:
-        """Kit of a model file or ``sample:NAME``; `options` are the fields of the recipe.
-
-        Raises
-        ------
-        ModelError
-            If there is no such file or sample.
-        RecipeError
-            If an option is wrong.
-        """
+        """Kit of a model file or ``sample:NAME``; `options` and errors as of :func:`open_kit`."""
         return open_kit(
             str(model),
             folder=None if folder is None else Path(folder),
@@ -318,15 +310,12 @@ class Kit(StageRunner):
             if stage != "check" or not self.delivered():
                 write_stage(self, stage, result)
 
-    def has_path(self) -> bool:
-        """Whether a tree with its path was made for this recipe."""
+    def is_made(self, stage: Literal["fold", "join"]) -> bool:
+        """Whether the result of a stage is there for this recipe, in memory or in the folder."""
         key = keys.fold_key(self.recipe, self._template, self._mark())
-        return self._is_done("fold", key)
-
-    def has_bodies(self) -> bool:
-        """Whether the printed bodies were made for this recipe."""
-        key = keys.join_key(self.recipe, self._template, self.print_mode(), self._mark())
-        return self._is_done("join", key)
+        if stage == "join":
+            key = keys.join_key(self.recipe, self._template, self.print_mode(), self._mark())
+        return self._is_done(stage, key)
 
     def delivered(self) -> list[Check]:
         """Check of the files of an exported kit against what was built; none before an export."""

@@ -62,7 +62,7 @@ def paths_by_forces(
         If none does; it says why the last one does not.
     """
     from fabfold.physics.actions import read_actions
-    from fabfold.physics.solve import physics_path
+    from fabfold.physics.forced_path import physics_path
 
     done = () if actions is None else read_actions(actions)
     reason, found = "", False

@@ -15,7 +15,7 @@ __all__ = [
     "Action",
     "Carve",
     "Match",
-    "Pin",
+    "PinVoxel",
     "Push",
     "Release",
     "Unfold",
@@ -57,7 +57,7 @@ class Push(_Action):
     force: tuple[float, float, float]
 
 
-class Pin(_Action):
+class PinVoxel(_Action):
     """Hold a voxel's body where it is from now on."""
 
     do: Literal["pin"] = "pin"
@@ -79,7 +79,7 @@ class Carve(_Action):
     voxel: Voxel
 
 
-Action = Unfold | Match | Push | Pin | Release | Carve
+Action = Unfold | Match | Push | PinVoxel | Release | Carve
 
 
 class _Session(BaseModel):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import RecipeError
 from fabfold.fold.core_sweep import CORE_HALF_SIDE
-from fabfold.physics.actions import Action, Carve, Match, Pin, Push, Release, Unfold
+from fabfold.physics.actions import Action, Carve, Match, PinVoxel, Push, Release, Unfold
 from fabfold.physics.rig import Box, rig_model
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import WHOLE, unpacked
@@ -228,7 +228,7 @@ class Unfolding:
                     watch(step + 1, action.steps)
         elif isinstance(action, Push):
             self._copies[action.shape].pushes[action.voxel] = np.array(action.force)
-        elif isinstance(action, Pin):
+        elif isinstance(action, PinVoxel):
             copy = self._copies[action.shape]
             body = self.tree.voxel_body[action.voxel]
             for other in self.tree.bodies[body].voxels:

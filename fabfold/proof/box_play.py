@@ -68,7 +68,7 @@ class BoxPlay:
     press_mm: float
 
 
-class _Linkage:
+class _PlayLinkage:
     """Motions of points of the box, linear in the six numbers of every hinge."""
 
     def __init__(self, tree: FoldTree, joinery: Joinery, poses: F64) -> None:
@@ -133,7 +133,7 @@ def box_play(
     if not tree.hinges:
         return BoxPlay(0.0, _gap(joinery), 0.0, _gap(joinery), 0.0)
     poses = poses_in_mm(tree, joinery, angles_deg)
-    linkage = _Linkage(tree, joinery, poses)
+    linkage = _PlayLinkage(tree, joinery, poses)
     meetings = face_meetings(tree, joinery, poses)
     limits = _limits(tree, joinery, angles_deg, pin)
     rng = np.random.default_rng(seed)
@@ -214,7 +214,7 @@ def _within(draws: F64, limits: F64) -> F64:
 def _parting(
     meetings: list[FaceMeeting],
     material: NDArray[np.bool_],
-    linkage: _Linkage,
+    linkage: _PlayLinkage,
     joinery: Joinery,
     poses: F64,
 ) -> tuple[F64, F64]:
@@ -290,7 +290,7 @@ def _let_go(draws: F64, parting: F64, least: F64, most: F64, limits: F64) -> F64
 
 
 def _outside(
-    tree: FoldTree, joinery: Joinery, poses: F64, linkage: _Linkage
+    tree: FoldTree, joinery: Joinery, poses: F64, linkage: _PlayLinkage
 ) -> tuple[tuple[F64, F64], F64, list[tuple[int, int, F64]]]:
     """Corners of the outer faces of the box, in the frame of the root body.
 

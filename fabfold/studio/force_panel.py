@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fabfold.errors import NoFoldError
-from fabfold.physics.actions import Action, Carve, Match, Pin, Push, Release, Unfold
+from fabfold.physics.actions import Action, Carve, Match, PinVoxel, Push, Release, Unfold
 from fabfold.physics.lattice_path import lattice_path
 from fabfold.physics.unfolding import Unfolding
 from fabfold.studio.kit_scene import KitScene, cube_meshes
@@ -122,7 +122,7 @@ class ForcePanel:
         x, y, z = (float(value) for value in self._force_vector.value)
         actions: dict[str, Any] = {
             "push": Push(shape=shape, voxel=voxel, force=(x, y, z)),  # type: ignore[arg-type]
-            "pin": Pin(shape=shape, voxel=voxel),  # type: ignore[arg-type]
+            "pin": PinVoxel(shape=shape, voxel=voxel),  # type: ignore[arg-type]
             "carve": Carve(voxel=voxel),
         }
         self._act([actions[what]])

@@ -135,6 +135,8 @@ class KitScene:
                 np.asarray(faces, np.uint32),
                 color=self._colours[index],
                 flat_shading=True,
+                cast_shadow=False,
+                receive_shadow=False,
                 visible=self._visible,
             )
             handle.on_click(self._clicked_body(index))
@@ -149,6 +151,8 @@ class KitScene:
                 np.asarray(faces, np.uint32),
                 color=_HINGE,
                 flat_shading=True,
+                cast_shadow=False,
+                receive_shadow=False,
                 visible=self._visible,
             )
             handle.on_click(self._clicked_hinge(index))

@@ -71,6 +71,8 @@ class StudioPage:
         )
         gui.set_panel_label(f"fabfold: {steps.recipe.name}")
         server.scene.set_up_direction("+z")
+        # Shadows of tens of thousands of triangles cost more than all the rest of a picture.
+        server.scene.configure_default_lights(enabled=True, cast_shadow=False)
         server.initial_camera.position = _CAMERA
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         self.tasks = PageTasks(server)
@@ -158,9 +160,9 @@ class StudioPage:
         kit = self._kit()
         self._checks = []
         self._verdict.content = "Not checked yet."
-        if kit.has_bodies():
+        if kit.is_made("join"):
             self.build()
-        elif kit.has_path():
+        elif kit.is_made("fold"):
             self._show_planned()
             self.set_view("Kit")
         else:
@@ -223,7 +225,7 @@ class StudioPage:
 
     def _planned(self) -> PlannedTree:
         kit = self._kit()
-        if not kit.has_path():
+        if not kit.is_made("fold"):
             raise NoFoldError("there is no tree yet: search for one first")
         planned: PlannedTree = kit.fold()
         return planned

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +35,14 @@ class PhysicsPath:
         What was done to find it; the same actions find it again.
     carved : tuple of int
         Voxels that were carved on the way.
+    attempts : int
+        How often it began.
     """
 
     path: NDArray[np.int32]
     actions: tuple[Action, ...]
     carved: tuple[int, ...]
+    attempts: int = 1
 
 
 def physics_path(
@@ -94,7 +97,7 @@ def physics_path(
             carved += _in_the_way(unfolding)
             continue
         progress.update(1.0, f"{len(found.path)} moves, {told}")
-        return found
+        return replace(found, attempts=attempt + 1)
     raise NoFoldError(
         f"forces alone do not fold this tree in {_ATTEMPTS} attempts; the last one: {reason}. "
         "Help it with pins, pushes and carving (fabfold studio), or leave out --method physics"
