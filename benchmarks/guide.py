@@ -30,7 +30,7 @@ def main() -> None:
         tree, motion = built.planned.tree, built.planned.motion
         plan = plan_steps(built.joinery, tree, motion, built.planned.voxels.rotation.T)
         step_views(built.joinery, tree, plan.steps[:1])  # What is compiled once is not counted.
-        turns = sum(view.turned for view in plan.views)
+        turns = sum(view.turned for view in plan.group_views)
         with tempfile.TemporaryDirectory() as folder:
             start = time.process_time()
             write_guide(Path(folder), kit.recipe, mode, built, SilentProgress())
@@ -39,7 +39,7 @@ def main() -> None:
             pages = page_count((Path(folder) / "manual.pdf").read_bytes())
         rows.append(
             f"| {kit.recipe.name} | {len(tree.bodies)} | {len(motion.moves) - 1} "
-            f"| {len(plan.steps)} | {turns} | {pages} | {sizes['manual.pdf']:.2f} "
+            f"| {len(plan.groups)} | {turns} | {pages} | {sizes['manual.pdf']:.2f} "
             f"| {sizes['manual.html']:.2f} | {sizes['fold.html']:.2f} | {seconds:.1f} |"
         )
         print(rows[-1], flush=True)

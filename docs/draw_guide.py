@@ -52,7 +52,7 @@ def main() -> None:
     plan = plan_steps(joinery, tree, motion, built.planned.voxels.rotation.T)
     meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     smooth = [corner_normals(v, f) for v, f in meshes]
-    steps = list(zip(plan.steps, plan.views, strict=False))
+    steps = list(zip(plan.groups, plan.group_views, strict=False))
     shown = [steps[0], *[pair for pair in steps[1:] if pair[1].turned][:1], steps[-1]]
     images = [
         draw_step(meshes, step, view, joinery.voxel_mm, STEP_PIXELS, smooth).image

@@ -17,7 +17,7 @@ import pytest
 from fabfold.export.camera import View, direction_frame, project
 from fabfold.guide.fold_steps import turned
 from fabfold.guide.manual import STEP_PIXELS, plan_steps
-from fabfold.guide.step_drawing import MOVING, draw_step
+from fabfold.guide.step_drawing import MOVING, STAYING, draw_step
 from fabfold.guide.step_views import _blocks, visible_share
 from fabfold.joinery.body_poses import poses_in_mm
 
@@ -38,7 +38,7 @@ def kit(bar_kit: Any) -> SimpleNamespace:
 
 @pytest.fixture(scope="module")
 def drawn(kit: SimpleNamespace) -> list[Any]:
-    pairs = zip(kit.plan.steps, kit.plan.views, strict=False)
+    pairs = zip(kit.plan.groups, kit.plan.group_views, strict=False)
     return [
         draw_step(kit.meshes, step, view, kit.joinery.voxel_mm, STEP_PIXELS) for step, view in pairs
     ]
@@ -79,45 +79,80 @@ def test_half_of_a_step_is_half_of_its_turn(kit: SimpleNamespace) -> None:
 
 def test_what_moves_is_seen(kit: SimpleNamespace, drawn: list[Any]) -> None:
     blocks = _blocks(kit.joinery, kit.tree)
-    for step, view, picture in zip(kit.plan.steps, kit.plan.views, drawn, strict=False):
+    for step, view, picture in zip(kit.plan.groups, kit.plan.group_views, drawn, strict=False):
         look = View(view.azimuth_deg, view.elevation_deg, size=(224, 168))
         before, after = blocks.posed(step.before), blocks.posed(step.after)
-        moving = np.isin(blocks.body, step.moving)[blocks.faces[:, 0]]
+        moving = np.isin(blocks.body, step.all_moving)[blocks.faces[:, 0]]
         within = np.concatenate([before, after])
         assert visible_share(before, blocks.faces, moving, look, within) >= LEAST_SEEN
-        # Pixels in about the colour of what moves, whatever its light.
+        # Pixels in about the colour of what moves in each turn, whatever its light.
         image = picture.image.astype(float) + 1
         red, green, blue = np.moveaxis(image, 2, 0)
-        coloured = (red > 2 * green) & (red > 3 * blue)
-        assert coloured.sum() > LEAST_PIXELS, step.number
-    assert MOVING[0] > 2 * MOVING[1]
+        coloured = (
+            (red > 2 * green) & (red > 3 * blue),
+            (blue > 1.3 * green) & (blue > 3 * red),
+            (blue > 1.5 * green) & (red > 1.3 * green),
+        )
+        for turn, pixels in zip(step.turns, coloured, strict=False):
+            assert pixels.sum() > LEAST_PIXELS, (step.number, turn.hinge)
+    # Without colour too, what moves is about as dark in each turn, and darker than what stays.
+    grey = [float(np.dot(colour, (0.299, 0.587, 0.114))) for colour in (*MOVING, STAYING)]
+    assert max(grey[:-1]) < 1.3 * min(grey[:-1]) < 0.7 * grey[-1]
 
 
-def test_the_arrow_turns_as_the_hinge_does(kit: SimpleNamespace, drawn: list[Any]) -> None:
-    for step, view, picture in zip(kit.plan.steps, kit.plan.views, drawn, strict=False):
+def test_the_arrows_turn_as_the_hinges_do(kit: SimpleNamespace, drawn: list[Any]) -> None:
+    for step, view, picture in zip(kit.plan.groups, kit.plan.group_views, drawn, strict=False):
         height, width = picture.image.shape[:2]
-        assert (picture.arrow >= 0).all()
-        assert (picture.arrow[:, 0] < width).all()
-        assert (picture.arrow[:, 1] < height).all()
         away = direction_frame(view.azimuth_deg, view.elevation_deg)[2]
-        towards = float(step.axis @ away)
-        if abs(towards) < 0.2:
-            continue
-        (hinge,) = project(step.point[None], picture.camera)[:, :2]
-        spokes = picture.arrow - hinge
-        # y points down: a turn that is counter-clockwise for the reader is negative here.
-        cross = spokes[:-1, 0] * spokes[1:, 1] - spokes[:-1, 1] * spokes[1:, 0]
-        assert np.sign(cross.sum()) == -np.sign(towards), step.number
+        assert len(picture.arrows) == len(picture.labels) == len(step.turns)
+        for turn, arrow in zip(step.turns, picture.arrows, strict=True):
+            assert (arrow >= 0).all()
+            assert (arrow[:, 0] < width).all()
+            assert (arrow[:, 1] < height).all()
+            towards = float(turn.axis @ away)
+            if abs(towards) < 0.2:
+                continue
+            (hinge,) = project(turn.point[None], picture.camera)[:, :2]
+            spokes = arrow - hinge
+            # y points down: a turn that is counter-clockwise for the reader is negative here.
+            cross = spokes[:-1, 0] * spokes[1:, 1] - spokes[:-1, 1] * spokes[1:, 0]
+            assert np.sign(cross.sum()) == -np.sign(towards), step.number
 
 
-def test_the_angle_stands_inside_the_picture_and_beside_the_arrow_head(drawn: list[Any]) -> None:
+def test_angles_stand_inside_the_picture_and_beside_the_arrow_heads(drawn: list[Any]) -> None:
     for picture in drawn:
-        left, top, right, bottom = picture.label
         height, width = picture.image.shape[:2]
-        assert 0 <= left < right <= width
-        assert 0 <= top < bottom <= height
-        x, y = picture.arrow[-1]
-        assert not (left < x < right and top < y < bottom)
+        for (left, top, right, bottom), arrow in zip(picture.labels, picture.arrows, strict=True):
+            assert 0 <= left < right <= width
+            assert 0 <= top < bottom <= height
+            x, y = arrow[-1]
+            assert not (left < x < right and top < y < bottom)
+        for one, other in combinations(picture.labels, 2):
+            assert (
+                one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
+            )
+
+
+def test_merged_steps_are_those_that_were_proven(kit: SimpleNamespace) -> None:
+    """Groups hold every move once, in order; their parts have no body in common."""
+    proven = [tuple(pair) for pair in kit.motion.certificate["any_order"]]
+    assert sum(len(group.turns) for group in kit.plan.groups) == len(kit.plan.steps)
+    at = 0
+    merged = []
+    for number, group in enumerate(kit.plan.groups, start=1):
+        assert group.number == number
+        size = len(group.turns)
+        mine = kit.plan.steps[at : at + size]
+        assert [turn.hinge for turn in group.turns] == [step.hinge for step in mine]
+        assert len(set(group.all_moving)) == len(group.all_moving)
+        assert np.allclose(group.before, mine[0].before)
+        assert np.allclose(group.after, mine[-1].after)
+        assert np.allclose(turned(group, 1.0), mine[-1].after, atol=1e-9)
+        if size > 1:
+            merged.append((at + 1, at + size))
+        at += size
+    assert set(merged) <= set(proven)
+    assert merged
 
 
 def words_of(pdf: Path) -> list[list[tuple[float, ...]]]:
@@ -137,7 +172,7 @@ def words_of(pdf: Path) -> list[list[tuple[float, ...]]]:
 @pytest.mark.parametrize("name", ["manual.pdf", "manual-letter.pdf"])
 def test_no_words_of_the_manual_overlap(name: str, kit: SimpleNamespace) -> None:
     pages = words_of(kit.folder / name)
-    steps = -(-len(kit.plan.steps) // 6)
+    steps = -(-len(kit.plan.groups) // 6)
     assert 3 + steps <= len(pages) <= 4 + steps
     wide, high = (595.3, 841.9) if name == "manual.pdf" else (612.0, 792.0)
     for page in pages:

@@ -13,7 +13,7 @@ from fabfold.fold.scene import Scene, clear_scene, pose_scene
 from fabfold.fold.turn_obstacles import TurnBuffers, obstacles, turn_buffers
 from fabfold.lattice.sweep import SweepTable
 
-__all__ = ["count_clashes", "follow", "shorten"]
+__all__ = ["count_clashes", "follow", "may_replace", "shorten"]
 
 
 @njit(cache=True)
@@ -114,7 +114,7 @@ def count_clashes(
 
 
 @njit(cache=True)
-def _may_replace(
+def may_replace(
     mech: Mechanism,
     scene: Scene,
     table: SweepTable,
@@ -159,7 +159,7 @@ def _drop_pairs(
             j += 1
         if j < len(path) and path[j, 1] == -path[i, 1]:
             part = path[i + 1 : j].copy()
-            if _may_replace(mech, scene, table, whole, carved, path, i, j + 1 - i, part):
+            if may_replace(mech, scene, table, whole, carved, path, i, j + 1 - i, part):
                 path = np.concatenate((path[:i], part, path[j + 1 :]))
                 i = 0
                 continue
@@ -192,11 +192,11 @@ def _gather_turns(
             between = path[i + 1 : j]
             early = np.concatenate((run, path[j : j + 1], between))
             late = np.concatenate((between, run, path[j : j + 1]))
-            if _may_replace(mech, scene, table, whole, carved, path, low, len(early), early):
+            if may_replace(mech, scene, table, whole, carved, path, low, len(early), early):
                 path[low : j + 1] = early
                 changed = True
                 continue
-            if _may_replace(mech, scene, table, whole, carved, path, low, len(late), late):
+            if may_replace(mech, scene, table, whole, carved, path, low, len(late), late):
                 path[low : j + 1] = late
                 changed = True
                 i = low

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.lattice.rotations import rotation_about
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["FoldStep", "fold_steps", "turned"]
+__all__ = ["FoldStep", "fold_steps", "grouped", "turned"]
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,9 @@ class FoldStep:
         Line of the hinge where it lies in this step, mm; the part turns about it right-handed.
     before, after : (b, 4, 4) float64 array
         Where all bodies are before and after the step, from shape A, mm.
+    also : tuple of FoldStep
+        Turns of other parts that belong to the step and may be made in any order with this one;
+        all begin where it begins.
     """
 
     number: int
@@ -51,6 +55,17 @@ class FoldStep:
     axis: NDArray[np.float64]
     before: NDArray[np.float64]
     after: NDArray[np.float64]
+    also: tuple[FoldStep, ...] = ()
+
+    @property
+    def turns(self) -> tuple[FoldStep, ...]:
+        """All turns of the step, this one first."""
+        return (self, *self.also)
+
+    @property
+    def all_moving(self) -> tuple[int, ...]:
+        """Bodies that move in any turn of the step."""
+        return tuple(body for turn in self.turns for body in turn.moving)
 
 
 def turned(step: FoldStep, share: float) -> NDArray[np.float64]:
@@ -68,10 +83,42 @@ def turned(step: FoldStep, share: float) -> NDArray[np.float64]:
     (b, 4, 4) float64 array
         Poses from shape A, mm.
     """
-    turn = rotation_about(step.point, step.axis, share * step.degrees)
     poses = step.before.copy()
-    poses[list(step.moving)] = turn @ poses[list(step.moving)]
+    for one in step.turns:
+        turn = rotation_about(one.point, one.axis, share * one.degrees)
+        poses[list(one.moving)] = turn @ poses[list(one.moving)]
     return np.asarray(poses)
+
+
+def grouped(steps: Sequence[FoldStep], any_order: Sequence[Sequence[int]]) -> list[FoldStep]:
+    """Steps with those merged that may be made in any order.
+
+    Parameters
+    ----------
+    steps : sequence of FoldStep
+        One a move, see :func:`fold_steps`.
+    any_order : sequence of (first, last)
+        Numbers of moves, as :func:`fabfold.proof.certify.certify_orders` proves them.
+
+    Returns
+    -------
+    list of FoldStep
+        Numbered from 1; the turns of a merged one begin together.
+    """
+    last_of = {int(first): int(last) for first, last in any_order}
+    out: list[FoldStep] = []
+    at = 0
+    while at < len(steps):
+        first = steps[at]
+        end = max(last_of.get(first.number, first.number) - first.number + at, at)
+        group = steps[at : end + 1]
+        also = tuple(
+            replace(turn, before=first.before, after=turned(replace(turn, before=first.before), 1))
+            for turn in group[1:]
+        )
+        out.append(replace(first, number=len(out) + 1, after=group[-1].after, also=also))
+        at = end + 1
+    return out
 
 
 def fold_steps(

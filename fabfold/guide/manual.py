@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,9 @@ from fabfold.export.kit_picture import nearest_lattice, picture_of_kit
 from fabfold.export.render import Image, render
 from fabfold.export.shading import corner_normals
 from fabfold.fold.motion import Motion
-from fabfold.guide.fold_steps import FoldStep, fold_steps
+from fabfold.guide.fold_steps import FoldStep, fold_steps, grouped
 from fabfold.guide.step_drawing import StepPicture, draw_step
-from fabfold.guide.step_views import StepView, step_views
+from fabfold.guide.step_views import LEAST_SEEN, StepView, step_views
 from fabfold.guide.wording import step_text
 from fabfold.joinery.bodies import Joinery
 from fabfold.progress import Progress, SilentProgress
@@ -38,14 +38,20 @@ class StepPlan:
     stand : (3, 3) float64 array
         Rotation from shape A's axes to how the kit lies on the table.
     steps : tuple of FoldStep
-        The steps.
+        One a move of the path.
     views : tuple of StepView
         One for each, and one for the end.
+    groups : tuple of FoldStep
+        The same with those merged that may be made in any order: the pictures of a manual.
+    group_views : tuple of StepView
+        One for each of these, and one for the end.
     """
 
     stand: NDArray[np.float64]
     steps: tuple[FoldStep, ...]
     views: tuple[StepView, ...]
+    groups: tuple[FoldStep, ...]
+    group_views: tuple[StepView, ...]
 
 
 @dataclass(frozen=True)
@@ -130,7 +136,23 @@ def plan_steps(
     """
     stand = nearest_lattice(upright)
     steps = fold_steps(joinery, tree, motion, stand)
-    return StepPlan(stand, tuple(steps), tuple(step_views(joinery, tree, steps)))
+    merged = [tuple(pair) for pair in motion.certificate.get("any_order", ())]
+    groups = grouped(steps, merged)
+    seen = step_views(joinery, tree, groups)
+    at, hidden = 1, []
+    for group, view in zip(groups, seen, strict=False):
+        if group.also and view.seen < LEAST_SEEN:
+            hidden.append((at, at + len(group.also)))
+        at += len(group.turns)
+    if hidden:  # No view shows all that moves: each turn gets a picture of its own.
+        groups = grouped(steps, [pair for pair in merged if pair not in hidden])
+        seen = step_views(joinery, tree, groups)
+    views = [
+        replace(view, turned=view.turned and number == 0)
+        for group, view in zip(groups, seen, strict=False)
+        for number in range(len(group.turns))
+    ]
+    return StepPlan(stand, tuple(steps), (*views, seen[-1]), tuple(groups), tuple(seen))
 
 
 def draw_manual(
@@ -179,11 +201,11 @@ def draw_manual(
     meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     smooth = [corner_normals(vertices, faces) for vertices, faces in meshes]
     drawn = []
-    for step, view in zip(plan.steps, plan.views, strict=False):
+    for step, view in zip(plan.groups, plan.group_views, strict=False):
         picture = draw_step(meshes, step, view, joinery.voxel_mm, STEP_PIXELS, smooth)
         words = step_text(step), step_text(step, brief=True)
         drawn.append(ManualStep(step.number, *words, view.turned, picture))
-        progress.update(step.number / (len(plan.steps) + 1), f"step {step.number}")
+        progress.update(step.number / (len(plan.groups) + 1), f"step {step.number}")
     lying = np.eye(4)[None].copy()
     lying[0, :3, :3] = plan.stand
     alone = View(size=PART_PIXELS, lights=3, ground=False, margin=0.04)
@@ -191,13 +213,14 @@ def draw_manual(
         render([mesh], colours[index : index + 1], lying, alone, smooth=[smooth[index]])
         for index, mesh in enumerate(meshes)
     ]
-    count = len(plan.steps)
+    count, turns = len(plan.groups), len(plan.steps)
     last = plan.views[-1]
     end = View(last.azimuth_deg, last.elevation_deg, size=STEP_PIXELS, lights=12)
     box = "a box" if tree.template.name.startswith("box-") else tree.template.name
     return Manual(
         title=title,
-        subtitle=f"folds into {box} in {count} step{'s' if count != 1 else ''}",
+        subtitle=f"folds into {box} in {count} step{'s' if count != 1 else ''}"
+        + (f" of {turns} turns" if turns > count else ""),
         cover=cover,
         contents=tuple(contents),
         advice=tuple(advice),

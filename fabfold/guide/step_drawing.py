@@ -8,28 +8,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.export.camera import PinholeCamera, View, camera_for, project
 from fabfold.export.render import Image, Mesh, posed_points, render
-from fabfold.guide.fold_steps import FoldStep, turned
+from fabfold.guide.fold_steps import FoldStep
 from fabfold.guide.fonts import font_file
 from fabfold.guide.step_views import StepView
+from fabfold.lattice.rotations import rotation_about
 
 __all__ = ["ARROW_SHARES", "MOVING", "STAYING", "StepPicture", "arrow_points", "draw_step"]
 
-#: Colours of what moves, of what stays, and of the pale image of where it ends.
-MOVING, STAYING, GHOST = (222, 88, 28), (226, 224, 219), (246, 190, 150)
-#: Share of the pale image in its picture.
-_PALE = 0.42
+#: Colours of what moves, by the turns of a step; all about as dark, and darker than what stays.
+MOVING = ((222, 88, 28), (24, 118, 168), (132, 78, 168))
+STAYING = (226, 224, 219)
+#: Share of the pale image in its picture, and of the colour in it.
+_PALE, _TINT = 0.42, 0.5
 #: From where to where on the turn the arrow goes.
 ARROW_SHARES = (0.06, 0.94)
 #: The arrow's distance from the hinge, in voxel sides.
 _REACH = (0.75, 1.6)
 #: Lines and letters are drawn this many times larger, and made smaller, so that they are smooth.
 _FINER = 3
+
+
+#: Left, top, right and bottom.
+Box2 = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -42,16 +49,16 @@ class StepPicture:
         sRGB.
     camera : PinholeCamera
         That it was taken with, in pixels of the image.
-    arrow : (n, 2) float64 array
-        The line of the arrow, from its tail to its head, in pixels.
-    label : four floats
-        Left, top, right and bottom of the angle that is written, in pixels.
+    arrows : tuple of (n, 2) float64 arrays
+        The line of each turn's arrow, from its tail to its head, in pixels.
+    labels : tuple of four floats each
+        Left, top, right and bottom of the angle that is written beside each, in pixels.
     """
 
     image: Image
     camera: PinholeCamera
-    arrow: NDArray[np.float64]
-    label: tuple[float, float, float, float]
+    arrows: tuple[NDArray[np.float64], ...]
+    labels: tuple[Box2, ...]
 
 
 def arrow_points(
@@ -90,11 +97,8 @@ def arrow_points(
     radius = float(np.clip(length, _REACH[0] * voxel_mm, _REACH[1] * voxel_mm))
     start = foot + out / length * radius
     shares = np.linspace(*ARROW_SHARES, count)
-    body = step.moving[0]
-    back = np.linalg.inv(step.before[body])
-    local = back[:3, :3] @ start + back[:3, 3]
-    poses = [turned(step, float(share))[body] for share in shares]
-    return np.array([pose[:3, :3] @ local + pose[:3, 3] for pose in poses])
+    turns = [rotation_about(step.point, step.axis, float(s) * step.degrees) for s in shares]
+    return np.array([turn[:3, :3] @ start + turn[:3, 3] for turn in turns])
 
 
 def draw_step(
@@ -127,23 +131,30 @@ def draw_step(
     StepPicture
         The picture, and where its arrow and label are.
     """
-    arc = arrow_points(step, meshes, voxel_mm)
+    arcs = [arrow_points(turn, meshes, voxel_mm) for turn in step.turns]
     after = posed_points(meshes, step.after)
-    within = np.concatenate([after, arc])
+    within = np.concatenate([after, *arcs])
     look = View(
         view.azimuth_deg, view.elevation_deg, size=size, ground=False, lights=4, margin=0.05
     )
-    colours = np.array(
-        [MOVING if body in step.moving else STAYING for body in range(len(meshes))], np.uint8
-    )
+    colours = np.tile(np.array(STAYING, np.uint8), (len(meshes), 1))
+    for turn, colour in zip(step.turns, cycle(MOVING), strict=False):
+        colours[list(turn.moving)] = colour
     image = render(meshes, colours, step.before, look, within=within, smooth=smooth)
     before = posed_points(meshes, step.before)
     camera = camera_for(np.concatenate([before, within]), look, size, None)
     image = _with_ghost(image, meshes, step, camera)
-    arrow = project(arc, camera)[:, :2]
-    axis = step.point + np.outer([-0.9, 0.9], step.axis) * voxel_mm
-    image, label = _with_marks(image, arrow, project(axis, camera)[:, :2], f"{step.degrees:g}°")
-    return StepPicture(image, camera, arrow, label)
+    arrows: list[NDArray[np.float64]] = []
+    labels: list[Box2] = []
+    for turn, arc in zip(step.turns, arcs, strict=True):
+        arrow = project(arc, camera)[:, :2]
+        axis = turn.point + np.outer([-0.9, 0.9], turn.axis) * voxel_mm
+        image, label = _with_marks(
+            image, arrow, project(axis, camera)[:, :2], f"{turn.degrees:g}°", labels
+        )
+        arrows.append(arrow)
+        labels.append(label)
+    return StepPicture(image, camera, tuple(arrows), tuple(labels))
 
 
 def _owners(
@@ -168,27 +179,37 @@ def _with_ghost(
 ) -> Image:
     """A pale image of where the moving bodies end, with an outline."""
     size = (image.shape[1], image.shape[0])
-    ends = np.isin(_owners(meshes, step.after, camera, size), step.moving)
-    here = np.isin(_owners(meshes, step.before, camera, size), step.moving)
-    ghost = ends & ~here
+    after = _owners(meshes, step.after, camera, size)
+    here = np.isin(_owners(meshes, step.before, camera, size), step.all_moving)
     result = image.astype(np.float64)
-    result[ghost] += _PALE * (np.array(GHOST) - result[ghost])
-    inner = ends.copy()
-    for axis in (0, 1):
-        for shift in (-1, 1):
-            inner &= np.roll(ends, shift, axis=axis)
-    line = ends & ~inner & ~here
-    # Dashed, so that in black and white too it is not taken for a thing that is there.
-    rows, columns = np.indices(line.shape)
-    line &= (rows + columns) // 5 % 3 < 2
-    result[line] = np.array(MOVING) * 0.8
+    for turn, colour in zip(step.turns, cycle(MOVING), strict=False):
+        ends = np.isin(after, turn.moving)
+        ghost = ends & ~here
+        pale = 255 - _TINT * (255 - np.array(colour, dtype=float))
+        result[ghost] += _PALE * (pale - result[ghost])
+        inner = ends.copy()
+        for axis in (0, 1):
+            for shift in (-1, 1):
+                inner &= np.roll(ends, shift, axis=axis)
+        line = ends & ~inner & ~here
+        # Dashed, so that in black and white too it is not taken for a thing that is there.
+        rows, columns = np.indices(line.shape)
+        line &= (rows + columns) // 5 % 3 < 2
+        result[line] = np.array(colour) * 0.8
     return np.asarray(np.rint(result), dtype=np.uint8)
 
 
 def _with_marks(
-    image: Image, arrow: NDArray[np.float64], axis: NDArray[np.float64], text: str
-) -> tuple[Image, tuple[float, float, float, float]]:
-    """The hinge's line, the arrow, and the angle beside it; bounds of the angle."""
+    image: Image,
+    arrow: NDArray[np.float64],
+    axis: NDArray[np.float64],
+    text: str,
+    taken: Sequence[Box2],
+) -> tuple[Image, Box2]:
+    """The hinge's line, the arrow, and the angle beside it; bounds of the angle.
+
+    The angle is written where none of those in `taken` is.
+    """
     from PIL import Image as PillowImage
     from PIL import ImageDraw, ImageFont
 
@@ -209,7 +230,9 @@ def _with_marks(
         grown = middle + (head - middle) * (1 + 2.2 * rim / (17 * unit))
         draw.polygon([tuple(p) for p in grown.tolist()], fill=colour)
     font = ImageFont.truetype(str(font_file(bold=True)), round(19 * unit))
-    label = _label_place(line, draw.textbbox((0, 0), text, font=font), layer.size, unit)
+    bounds = draw.textbbox((0, 0), text, font=font)
+    finer = [tuple(_FINER * value for value in box) for box in taken]
+    label = _label_place(line, bounds, layer.size, unit, finer)
     draw.rounded_rectangle(label, radius=7 * unit, fill=(255, 255, 255, 225))
     draw.text(
         ((label[0] + label[2]) / 2, (label[1] + label[3]) / 2),
@@ -265,7 +288,8 @@ def _label_place(
     bounds: tuple[float, float, float, float],
     size: tuple[int, int],
     unit: float,
-) -> tuple[float, float, float, float]:
+    taken: Sequence[tuple[float, ...]],
+) -> Box2:
     """Where the angle is written: beside the middle of the arrow, on its outer side, inside."""
     wide, tall = bounds[2] - bounds[0] + 12 * unit, bounds[3] - bounds[1] + 10 * unit
     middle = line[len(line) // 2]
@@ -275,4 +299,15 @@ def _label_place(
     x, y = middle + out * (0.5 * max(wide, tall) + 8 * unit)
     x = float(np.clip(x, wide / 2 + unit, size[0] - wide / 2 - unit))
     y = float(np.clip(y, tall / 2 + unit, size[1] - tall / 2 - unit))
+    # Past those that are there, up or down, whichever is nearer and still in the picture.
+    for shift in sorted(range(-12, 13), key=abs):
+        at = y + shift * tall / 3
+        box = (x - wide / 2, at - tall / 2, x + wide / 2, at + tall / 2)
+        inside = box[1] >= unit and box[3] <= size[1] - unit
+        if inside and not any(_overlap(box, other) for other in taken):
+            return box
     return (x - wide / 2, y - tall / 2, x + wide / 2, y + tall / 2)
+
+
+def _overlap(one: Sequence[float], other: Sequence[float]) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]

@@ -17,7 +17,7 @@ from fabfold.guide.fold_steps import FoldStep
 from fabfold.joinery.bodies import Joinery
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["FIRST_VIEW", "StepView", "step_views", "visible_share"]
+__all__ = ["FIRST_VIEW", "LEAST_SEEN", "StepView", "step_views", "visible_share"]
 
 #: Pixels of the small pictures in which it is counted what can be seen.
 _PIXELS = (112, 84)
@@ -27,7 +27,7 @@ _HEIGHTS = (24, 48, -24)
 #: A reader turns the object where another view is this much better.
 _WORTH_TURNING = 1.5
 #: Least share of what moves that must be seen in a view that is kept.
-_LEAST_SEEN = 0.3
+LEAST_SEEN = 0.3
 #: Seen from below counts less: nobody likes to look there.
 _FROM_BELOW = 0.75
 
@@ -42,11 +42,14 @@ class StepView:
         As of :class:`fabfold.export.camera.View`.
     turned : bool
         Whether the object is turned for it, against the step before.
+    seen : float
+        Share of what moves that is seen, of the turn of which least is seen.
     """
 
     azimuth_deg: float
     elevation_deg: float
     turned: bool = False
+    seen: float = 1.0
 
 
 #: The view that a model is shown in, if nothing speaks against it.
@@ -142,17 +145,19 @@ def _directions() -> Iterator[tuple[float, float]]:
 def _score(blocks: _Blocks, step: FoldStep, direction: tuple[float, float]) -> tuple[float, float]:
     """How well a step is seen from a direction, and how much of what moves is seen."""
     before, after = blocks.posed(step.before), blocks.posed(step.after)
-    moving = np.isin(blocks.body, step.moving)[blocks.faces[:, 0]]
     view = View(*direction, size=_PIXELS)
     within = np.concatenate([before, after])
-    first = visible_share(before, blocks.faces, moving, view, within)
-    last = visible_share(after, blocks.faces, moving, view, within)
+    first = last = 1.0
+    for turn in step.turns:
+        moving = np.isin(blocks.body, turn.moving)[blocks.faces[:, 0]]
+        first = min(first, visible_share(before, blocks.faces, moving, view, within))
+        last = min(last, visible_share(after, blocks.faces, moving, view, within))
     azimuth, height = np.radians(direction)
     away = np.array(
         [np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height), np.sin(height)]
     )
     # Along its axis a turn is seen as it is; square to it, as a stroke.
-    sense = 0.45 + 0.55 * abs(float(step.axis @ away))
+    sense = 0.45 + 0.55 * min(abs(float(turn.axis @ away)) for turn in step.turns)
     score = (0.1 + 0.9 * first) * (0.4 + 0.6 * last) * sense
     return score * (_FROM_BELOW if height < 0 else 1.0), min(first, 2 * last)
 
@@ -181,8 +186,8 @@ def step_views(joinery: Joinery, tree: FoldTree, steps: Sequence[FoldStep]) -> l
         found = {direction: _score(blocks, step, direction) for direction in _directions()}
         best = max(found, key=lambda direction: found[direction][0])
         score, seen = found[now]
-        turn = score * _WORTH_TURNING < found[best][0] or seen < _LEAST_SEEN < found[best][1]
+        turn = score * _WORTH_TURNING < found[best][0] or seen < LEAST_SEEN < found[best][1]
         now = best if turn else now
-        views.append(StepView(*now, turned=turn))
+        views.append(StepView(*now, turned=turn, seen=found[now][1]))
     last = StepView(now[0], abs(now[1]), turned=now[1] < 0)
     return [*views, last]

@@ -31,10 +31,17 @@ def step_text(step: FoldStep, *, brief: bool = False) -> str:
     brief : bool
         Whether to say how many parts turn together, in place of their numbers.
     """
-    parts = [part_number(body) for body in step.moving]
+    if step.also:
+        told = [_turn_text(turn, brief).lower() for turn in step.turns]
+        return f"In any order: {'; '.join(told)}"
+    return _turn_text(step, brief)
+
+
+def _turn_text(turn: FoldStep, brief: bool) -> str:
+    parts = [part_number(body) for body in turn.moving]
     which = f"parts {listed(parts)} together"
     if len(parts) == 1:
         which = f"part {parts[0]}"
     elif brief:
         which = f"{len(parts)} parts together"
-    return f"{_TURNS.get(round(step.degrees), 'Turn')} ({step.degrees:g}°): {which}"
+    return f"{_TURNS.get(round(turn.degrees), 'Turn')} ({turn.degrees:g}°): {which}"

@@ -86,7 +86,7 @@ def build(
     """
     from fabfold.joinery.build import build_bodies
     from fabfold.joinery.loose_pins import meshes_with_pins
-    from fabfold.proof.certify import certify
+    from fabfold.proof.certify import certify, certify_orders
 
     profile, apart, retention = mode.profile, None, None
     joinery = build_bodies(
@@ -109,6 +109,15 @@ def build(
         progress.update(None, "places for magnets")
         joinery, retention = hold_shut(planned.tree, planned.motion, joinery, MAGNETS[mode.magnet])
     certificate = certify(
+        planned.tree,
+        planned.motion,
+        meshes_with_pins(joinery),
+        voxel_mm=joinery.voxel_mm,
+        origin_mm=joinery.origin_mm,
+        min_gap_mm=profile.min_gap_mm,
+        progress=progress,
+    )
+    certificate["any_order"] = certify_orders(
         planned.tree,
         planned.motion,
         meshes_with_pins(joinery),
@@ -150,7 +159,7 @@ def build_first(
     refused: list[str] = []
     for planned in trees:
         try:
-            return build(planned, mode, voxel_mm, tuple(refused), progress)
+            return _build_for_hands(planned, mode, voxel_mm, tuple(refused), progress)
         except (GeometryError, CheckError) as error:
             refused.append(str(error))
             progress.update(None, f"tree {len(refused)} refused: {error}")
@@ -159,3 +168,26 @@ def build_first(
         f"the last one: {refused[-1]}. Try another --seed, a larger --voxel-mm or a "
         "smaller --clearance-mm"
     )
+
+
+def _build_for_hands(
+    planned: PlannedTree,
+    mode: PrintMode,
+    voxel_mm: float,
+    refused: tuple[str, ...],
+    progress: Progress,
+) -> BuiltTree:
+    """Build a tree for its path in an order that suits hands, or in the planner's own."""
+    from fabfold.fold.motion import motion_of, quarter_path
+    from fabfold.fold.tidy import tidied
+    from fabfold.tree.system import hinge_system
+
+    path = quarter_path(planned.tree, planned.motion)
+    if path is not None:
+        motion = motion_of(planned.tree, tidied(hinge_system(planned.tree), path))
+        if motion.moves != planned.motion.moves:
+            try:
+                return build(replace(planned, motion=motion), mode, voxel_mm, refused, progress)
+            except (GeometryError, CheckError) as error:
+                progress.update(None, f"in the planner's order: {error}")
+    return build(planned, mode, voxel_mm, refused, progress)

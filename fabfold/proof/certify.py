@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,13 @@ from numpy.typing import NDArray
 
 from fabfold.errors import CheckError
 from fabfold.fold.motion import Motion, end_pose_error
+from fabfold.meshes import mesh_volume
 from fabfold.progress import Progress, SilentProgress
 from fabfold.proof.bvh import BoxTrees, new_box_trees, refit
 from fabfold.proof.gap import FAILED, UNPROVEN, prove_gap, prove_pairs
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["certify"]
+__all__ = ["certify", "certify_orders"]
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
@@ -302,6 +304,93 @@ def certify(
         "moves": moves,
         "end_pose_error": error,
     }
+
+
+def certify_orders(
+    tree: FoldTree,
+    motion: Motion,
+    meshes: Sequence[tuple[F64, I32]],
+    voxel_mm: float,
+    origin_mm: Sequence[float],
+    min_gap_mm: float,
+    progress: Progress | None = None,
+    *,
+    most: int = 3,
+    slack_mm: float = 0.01,
+) -> list[tuple[int, int]]:
+    """Moves next to each other that may be made in any order, and keep the gap in each.
+
+    Moves of a group turn parts that have no body in common, the smaller side of each hinge. Every
+    move of it is proven from every state in which some of the others are made already.
+
+    Parameters
+    ----------
+    tree, motion, meshes, voxel_mm, origin_mm, min_gap_mm, slack_mm
+        As for :func:`certify`, which the path has passed.
+    progress : Progress, optional
+        Hears of every group.
+    most : int
+        Moves of a group at most.
+
+    Returns
+    -------
+    list of (first, last)
+        Numbers of moves, from 1; groups of at least two, in order.
+    """
+    progress = progress or SilentProgress()
+    bodies = _load(tree, meshes, voxel_mm, origin_mm)
+    hinges = [int(moving[0]) for moving in motion.moves[1:]]
+    parts = [_smaller_side(tree, meshes, hinge) for hinge in hinges]
+    groups: list[tuple[int, int]] = []
+    first = 0
+    while first < len(hinges):
+        last = first
+        while last + 1 < len(hinges) and last + 1 - first < most:
+            more = range(first, last + 2)
+            if any((parts[last + 1] & parts[other]).any() for other in more[:-1]):
+                break
+            progress.update(first / len(hinges), f"moves {first + 1} to {last + 2} in any order")
+            if not _in_any_order(tree, motion, bodies, list(more), min_gap_mm, slack_mm):
+                break
+            last += 1
+        if last > first:
+            groups.append((first + 1, last + 1))
+        first = last + 1
+    return groups
+
+
+def _smaller_side(
+    tree: FoldTree, meshes: Sequence[tuple[F64, I32]], hinge: int
+) -> NDArray[np.bool_]:
+    """Bodies on the side of a hinge with less material, shape (b,) bool."""
+    carried = _carried(tree, hinge)
+    volume = np.array([mesh_volume(vertices, faces) for vertices, faces in meshes])
+    return carried if volume[carried].sum() <= volume[~carried].sum() else ~carried
+
+
+def _in_any_order(
+    tree: FoldTree, motion: Motion, bodies: _Bodies, moves: list[int], gap: float, slack: float
+) -> bool:
+    """Whether each of some moves, counted from 0, keeps the gap whichever others are made."""
+    start = motion.angles_deg[moves[0]]
+    turns = [motion.angles_deg[move + 1] - motion.angles_deg[move] for move in moves]
+    # The last one was added to moves for which this is known: what involves it is new.
+    for number, turn in enumerate(turns):
+        others = [other for other in range(len(turns)) if other != number]
+        for count in range(len(others) + 1):
+            for made in combinations(others, count):
+                if number != len(turns) - 1 and len(turns) - 1 not in made:
+                    continue
+                if made == tuple(range(number)):
+                    continue  # The order of the path itself.
+                before = start + sum((turns[other] for other in made), np.zeros(len(start)))
+                hinge = int(np.flatnonzero(turn)[0])
+                try:
+                    _move(tree, bodies, before, hinge, float(turn[hinge]), gap - 1e-9, slack,
+                          2.0 * gap, f"hinge {hinge}", gap)  # fmt: skip
+                except CheckError:
+                    return False
+    return True
 
 
 def _move(
