@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from .joint_play import total_play as total_play
     from .leaf import Bracket as Bracket
     from .leaf import Leaf as Leaf
+    from .print_files import write_3mf as write_3mf
+    from .print_files import write_step as write_step
     from .printed_pins import ConePin as ConePin
     from .printed_pins import StraightPin as StraightPin
     from .retention import Magnet as Magnet
@@ -80,7 +82,9 @@ _HOMES = {
     "hinge_location": "edges",
     "play": "joint_play",
     "total_play": "joint_play",
+    "write_3mf": "print_files",
     "write_coupon": "tolerance_coupon",
+    "write_step": "print_files",
 }
 
 __all__ = sorted(_HOMES)  # noqa: PLE0605
