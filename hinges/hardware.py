@@ -18,23 +18,24 @@ __all__ = ["SCREWS", "FilamentPin", "LoosePin", "RodPin", "Screw", "ScrewPin"]
 
 @dataclass(frozen=True)
 class Screw:
-    """Sizes of a metric machine screw and its nut.
+    """Sizes of a machine screw and its nut.
 
     Attributes
     ----------
     name : str
-        Short name, such as "M3".
+        Short name, such as "M3" or "#6-32".
     diameter : float
         Nominal diameter of the thread in mm.
     clear, tap : float
-        Diameters in mm of the hole that it passes (ISO 273, medium) and of the one that it cuts its
-        thread in.
+        Diameters in mm of the hole that it passes (ISO 273, medium; ASME B18.2.8, normal) and of
+        the one that it cuts its thread in: the tap drill, 0.1 mm wider.
     cap, cap_height : float
-        Diameter and height of the cylinder head in mm, ISO 4762.
+        Diameter and height of the cylinder head in mm, ISO 4762; ASME B18.3.
     sunk : float
-        Diameter of the 90° countersunk head in mm, ISO 7046.
+        Diameter of the countersunk head in mm, ISO 7046 (90°); ASME B18.6.3 (82°, which lies in
+        the 90° pocket with its rim).
     nut, nut_height : float
-        Size across the flats and height of the nut in mm, ISO 4032.
+        Size across the flats and height of the nut in mm, ISO 4032; ASME B18.6.3.
     """
 
     name: str
@@ -51,12 +52,29 @@ class Screw:
 SCREWS: Final[dict[str, Screw]] = {
     screw.name: screw
     for screw in (
+        Screw("M1.6", 1.6, 1.8, 1.35, 3.0, 1.6, 3.0, 3.2, 1.3),
         Screw("M2", 2.0, 2.4, 1.7, 3.8, 2.0, 3.8, 4.0, 1.6),
         Screw("M2.5", 2.5, 2.9, 2.15, 4.5, 2.5, 4.7, 5.0, 2.0),
         Screw("M3", 3.0, 3.4, 2.6, 5.5, 3.0, 5.5, 5.5, 2.4),
+        Screw("M4", 4.0, 4.5, 3.4, 7.0, 4.0, 8.4, 7.0, 3.2),
+        Screw("M5", 5.0, 5.5, 4.3, 8.5, 5.0, 9.3, 8.0, 4.7),
+        Screw("#2-56", 2.18, 2.59, 1.88, 3.56, 2.18, 4.37, 4.76, 1.59),
+        Screw("#4-40", 2.84, 3.25, 2.36, 4.65, 2.84, 5.72, 6.35, 2.38),
+        Screw("#6-32", 3.51, 3.91, 2.81, 5.74, 3.51, 7.09, 7.94, 2.78),
+        Screw("#8-32", 4.17, 4.57, 3.55, 6.86, 4.17, 8.43, 8.73, 3.18),
+        Screw("#10-24", 4.83, 5.23, 3.9, 7.92, 4.83, 9.78, 9.53, 3.18),
+        Screw("1/4-20", 6.35, 7.14, 5.2, 9.53, 6.35, 12.88, 11.11, 4.76),
     )
 }
 """The screws that printed hinges are pinned with, by name."""
+
+
+def _screw(name: str) -> Screw:
+    """A screw by its name, or by that of its thread alone, such as "#6" or "1/4"."""
+    found = [screw for screw in SCREWS.values() if name in (screw.name, screw.name.split("-")[0])]
+    if not found:
+        raise HingeError(f"screw {name!r} is unknown: use one of {', '.join(SCREWS)}")
+    return found[0]
 
 
 def loose_pin_contacts(
@@ -242,12 +260,13 @@ class RodPin(LoosePin):
 
 @dataclass(frozen=True)
 class ScrewPin(Pin):
-    """A metric screw through all knuckles, held by a nut or by its own thread in the last.
+    """A screw through all knuckles, held by a nut or by its own thread in the last.
 
     Parameters
     ----------
-    size : {"M2", "M2.5", "M3"}
-        Nominal thread of the screw.
+    size : str
+        Its thread, a name of :data:`SCREWS`: M1.6 to M5, #2-56 to #10-24 and 1/4-20; "#6" is
+        "#6-32".
     head : {"cylinder", "countersunk"}
         Form of its head.
     end : {"nut", "tap"}
@@ -265,8 +284,7 @@ class ScrewPin(Pin):
 
     def __post_init__(self) -> None:
         """Refuse unknown sizes and forms."""
-        if self.size not in SCREWS:
-            raise HingeError(f"screw {self.size!r} is unknown: use one of {', '.join(SCREWS)}")
+        _screw(self.size)
         if self.head not in ("cylinder", "countersunk") or self.end not in ("nut", "tap"):
             raise HingeError(
                 f"screw pin: head {self.head!r} must be cylinder or countersunk and end "
@@ -278,7 +296,7 @@ class ScrewPin(Pin):
     @property
     def screw(self) -> Screw:
         """The sizes of the screw."""
-        return SCREWS[self.size]
+        return _screw(self.size)
 
     @property
     def _nut_radius(self) -> float:

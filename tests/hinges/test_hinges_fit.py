@@ -18,9 +18,11 @@ from hinges import (
     SingleHinge,
     Stops,
     StraightPin,
+    play,
 )
 from hinges.barrel import default_radii
 from hinges.clearance import PROCESSES, millimetres
+from hinges.hardware import SCREWS
 from hinges.plan_single import SingleSpec, plan_single
 
 
@@ -167,3 +169,26 @@ def test_process_sets_the_wall_too():
 def test_the_part_refuses_as_the_plan_does():
     with pytest.raises(FitError, match="retention"):
         SingleHinge(20, knuckles=2)
+
+
+@pytest.mark.parametrize("name", SCREWS)
+@pytest.mark.parametrize(("end", "sunk"), [("nut", False), ("tap", True)])
+def test_a_hinge_on_every_screw_turns_with_its_gaps(name, end, sunk):
+    """The screw passes the bores that are wide, and its head and nut find room."""
+    screw = SCREWS[name]
+    assert screw.tap < screw.diameter < screw.clear < screw.cap
+    assert screw.diameter < screw.nut
+    length = max(25.0, 14 * screw.diameter)
+    hinge = SingleHinge(length, pin=ScrewPin(name, end=end, sunk=sunk), clearance=0.4)
+    plan = hinge.plan
+    assert plan.layout.radius >= 0.5 * screw.clear + 0.8
+    found = play(hinge)
+    assert found.radial >= screw.clear - screw.diameter - 1e-9
+    assert found.axial[1] > 0
+
+
+def test_a_thread_alone_names_its_screw():
+    assert ScrewPin("#6").screw is SCREWS["#6-32"]
+    assert ScrewPin("1/4").screw is SCREWS["1/4-20"]
+    with pytest.raises(HingeError, match=r"screw 'M7' is unknown: use one of M1\.6, M2"):
+        ScrewPin("M7")
