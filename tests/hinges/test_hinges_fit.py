@@ -142,7 +142,7 @@ def test_parameters_that_make_no_sense(changes):
         lambda: StraightPin(0.0),
         lambda: FilamentPin(2.0),
         lambda: RodPin(-1.0),
-        lambda: ScrewPin("M5"),
+        lambda: ScrewPin("M7"),
         lambda: ScrewPin("M3", head="countersunk"),
         lambda: ScrewPin("M3", end="weld"),
         lambda: Detents(()),
