@@ -47,7 +47,7 @@ def studio(bar_kit: Any, tmp_path: Any, browser: Any) -> Iterator[Any]:
     page.get_by_text("Opening: done.").wait_for(timeout=WAIT_MS)
     yield page, folder, address[0]
     page.close()
-    run.send_signal(signal.SIGINT)
+    run.send_signal(signal.SIGTERM)  # a shell may have its children ignore SIGINT
     assert run.wait(timeout=30) == 130
     assert page.said == []
     here = address[0].split("/?")[0].removeprefix("http://")

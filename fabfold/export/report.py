@@ -73,6 +73,7 @@ def write_report(
     *,
     title: str = "kit",
     pictures: Sequence[tuple[str, bytes]] = (),
+    where: Mapping[str, bytes] | None = None,
 ) -> None:
     """Write ``report.json`` and ``report.html``, a page to read.
 
@@ -88,7 +89,11 @@ def write_report(
         Heading of the page.
     pictures : sequence of (str, bytes)
         Caption and PNG of each picture that the page shows, inside the file.
+    where : mapping of str to bytes, optional
+        PNG of where a figure was found, by the name of its check.
     """
     data = report_data(checks, summary)
     write_json(folder / "report.json", data)
-    write_text(folder / "report.html", report_page(data, title=title, pictures=pictures))
+    write_text(
+        folder / "report.html", report_page(data, title=title, pictures=pictures, where=where)
+    )

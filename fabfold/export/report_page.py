@@ -29,6 +29,7 @@ table { border-collapse: collapse; width: 100%; margin: .6rem 0 1.4rem; font-siz
 th, td { border-bottom: 1px solid var(--line); padding: .35rem .6rem; text-align: left;
   vertical-align: top; }
 td.n { font-variant-numeric: tabular-nums; white-space: nowrap; }
+img.where { float: right; width: 150px; margin: 0 0 .3rem .8rem; border-radius: 6px; }
 td small { color: var(--soft); display: block; }
 .ok { color: var(--ok); font-weight: 600; } .failed { color: var(--bad); font-weight: 600; }
 figure { margin: 0 0 1rem; } figcaption, .soft { color: var(--soft); font-size: .92rem; }
@@ -167,13 +168,25 @@ def _limit(check: Mapping[str, Any]) -> str:
     return f"{text} <small>{words} {_cell(limit)}</small>"
 
 
-def _table(title: str, checks: Sequence[Mapping[str, Any]]) -> str:
+def _where(check: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
+    """Picture of where a figure was found, where there is one."""
+    png = pictures.get(check["name"])
+    if png is None:
+        return ""
+    return (
+        f'<img class="where" alt="where: {escape(check["name"])}" '
+        f'src="data:image/png;base64,{base64.b64encode(png).decode()}">'
+    )
+
+
+def _table(title: str, checks: Sequence[Mapping[str, Any]], pictures: Mapping[str, bytes]) -> str:
     if not checks:
         return ""
     order = sorted(checks, key=lambda check: check["verdict"] == "ok")
     rows = "".join(
         f'<tr><td class="{check["verdict"]}">{"✓" if check["verdict"] == "ok" else "✗"}</td>'
-        f"<td>{escape(check['name'])}<small>{escape(check['note'])}</small></td>"
+        f"<td>{_where(check, pictures)}{escape(check['name'])}"
+        f"<small>{escape(check['note'])}</small></td>"
         f'<td class="n">{_limit(check)}</td></tr>'
         for check in order
     )
@@ -181,7 +194,11 @@ def _table(title: str, checks: Sequence[Mapping[str, Any]]) -> str:
 
 
 def report_page(
-    data: Mapping[str, Any], *, title: str = "kit", pictures: Sequence[tuple[str, bytes]] = ()
+    data: Mapping[str, Any],
+    *,
+    title: str = "kit",
+    pictures: Sequence[tuple[str, bytes]] = (),
+    where: Mapping[str, bytes] | None = None,
 ) -> str:
     """A page that shows the report, with nothing outside the one file.
 
@@ -193,13 +210,15 @@ def report_page(
         Heading of the page.
     pictures : sequence of (str, bytes)
         Caption and PNG of each picture that the page shows.
+    where : mapping of str to bytes, optional
+        PNG of where a figure was found, by the name of its check.
 
     Returns
     -------
     str
         The page as HTML.
     """
-    checks, summary = data["checks"], data["summary"]
+    checks, summary, places = data["checks"], data["summary"], where or {}
     failed = sum(check["verdict"] != "ok" for check in checks)
     verdict = (
         f'<p class="verdict ok">All {len(checks)} checks passed.</p>'
@@ -227,8 +246,8 @@ def report_page(
         f"<title>{escape(title)}: report</title><style>{_STYLE}</style></head><body>"
         f"<h1>{escape(title)}</h1>{verdict}{figures}{_answers(data)}{_next_steps(summary)}"
         f"{f'<h2>What was done to the model</h2><ul>{told}</ul>' if told else ''}"
-        f"<h2>Checks</h2>{_table('Folding', [c for c in checks if _is_of_folding(c)])}"
-        f"{_table('Printing', [c for c in checks if not _is_of_folding(c)])}"
+        f"<h2>Checks</h2>{_table('Folding', [c for c in checks if _is_of_folding(c)], places)}"
+        f"{_table('Printing', [c for c in checks if not _is_of_folding(c)], places)}"
         f"<details><summary>All figures of the kit</summary><table>{facts}</table></details>"
         "</body></html>\n"
     )

@@ -19,6 +19,7 @@ from fabfold.export.urdf import write_urdf
 from fabfold.files import write_bytes, write_json, write_text
 from fabfold.joinery.magnets import Retention
 from fabfold.kit.box_closure import BoxClosure
+from fabfold.kit.figure_pictures import figure_pictures
 from fabfold.kit.guide_files import PICTURE, write_guide
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.lattice.template import Template
@@ -328,7 +329,8 @@ def write_checks(
 ) -> None:
     """Write ``report.json`` and ``report.html``, with what became of each wish and of the box."""
     summary = kit_summary(solid, built, wishes, closure, profile)
-    write_report(folder, checks, summary, title=solid.name, pictures=pictures)
+    places = figure_pictures(checks, built)
+    write_report(folder, checks, summary, title=solid.name, pictures=pictures, where=places)
 
 
 def write_kit(
