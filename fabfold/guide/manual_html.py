@@ -94,7 +94,8 @@ def manual_html(manual: Manual) -> str:
         f'<h2>The parts</h2><ul class="parts">{_parts(manual)}</ul>'
         f"{_list('Putting it together', manual.assembly, 'ol')}"
         "<h2>Folding</h2><p>Hold what is light. Turn what is dark along the arrow, as far as the "
-        "number says; the dashed outline shows where it ends. The line of dashes and dots is the "
+        "number says; the dashed outline shows where it ends. Where a step has more than one "
+        "colour, each is a turn by itself, in any order. The line of dashes and dots is the "
         "hinge. To see it move, open <em>fold.html</em>.</p>"
         f'<ol class="steps">{"".join(_step(step) for step in manual.steps)}</ol>'
         f"<h2>Done: the box is closed</h2>{_image(manual.end, 'The closed box', 'cover')}"

@@ -153,6 +153,8 @@ def _before(pdf: FPDF, manual: Manual) -> None:
             "Hold what is light. Turn what is dark along the arrow, as far as the number says. The "
             "dashed outline shows where it ends.",
             "The line of dashes and dots is the hinge.",
+            "Where a step has more than one colour, each colour is a turn by itself: make them one "
+            "after the other, in any order.",
             "Where a step says “turn the whole”, the picture is seen from another side than the "
             "one before: turn the kit in your hands until it looks the same.",
         ],
