@@ -46,7 +46,7 @@ class View:
     size: tuple[int, int] = (1200, 900)
     margin: float = 0.06
     samples: int = 2
-    lights: int = 24
+    lights: int = 16
     ground: bool = True
     edges: float = 0.55
     background: tuple[int, int, int] = (255, 255, 255)
