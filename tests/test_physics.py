@@ -23,6 +23,7 @@ from fabfold.physics.actions import (
     Push,
     Release,
     Unfold,
+    Wait,
     actions_json,
     read_actions,
 )
@@ -122,6 +123,25 @@ def test_a_pinned_body_stays_and_a_pushed_one_goes():
     assert np.linalg.norm(let - end) > 1.0
 
 
+def test_while_waiting_only_pushes_act():
+    unfolding = Unfolding(strip())
+    unfolding.do(Wait(steps=200))
+    assert np.allclose(unfolding.angles_deg("A"), 0, atol=1e-6)
+    assert np.allclose(unfolding.angles_deg("B"), strip().fold_angles, atol=0.5)
+    unfolding.do(Push(shape="A", voxel=7, force=(0.0, 30.0, 0.0)))
+    unfolding.do(Wait(steps=100))
+    moved = unfolding.angles_deg("A")
+    assert np.abs(moved).max() > 5
+    # A push of nothing ends it; what is joined is one action.
+    unfolding.do(Push(shape="A", voxel=7, force=(0.0, 0.0, 0.0)))
+    unfolding.do(Wait(steps=100))
+    unfolding.do(Wait(steps=300), joined=True)
+    assert unfolding.actions[-1] == Wait(steps=400)
+    rest = unfolding.angles_deg("A")
+    unfolding.do(Wait(steps=100))
+    assert np.allclose(unfolding.angles_deg("A"), rest, atol=0.05)
+
+
 def test_carving_leaves_the_core_in_both_shapes():
     tree = strip()
     boxes, voxels = cell_boxes(tree, {3})
@@ -217,6 +237,7 @@ def test_actions_come_back_from_their_file(tmp_path):
         Carve(voxel=3),
         Release(shape="A"),
         Match(steps=20),
+        Wait(steps=5),
     )
     path = tmp_path / "session.json"
     path.write_text(json.dumps(actions_json(actions)), encoding="utf-8")

@@ -15,7 +15,7 @@ from fabfold.errors import ModelError, NoFoldError, RecipeError
 from fabfold.joinery.sizes import hinge_size
 from fabfold.kit.kit import open_kit
 from fabfold.lattice.rotations import rotation_of_degrees
-from fabfold.physics.actions import Match, Unfold
+from fabfold.physics.actions import Match, Unfold, Wait
 from fabfold.recipe.start import set_up_project
 from fabfold.solid.closed_solid import Solid
 from fabfold.studio.fold_panel import angles_at
@@ -363,6 +363,35 @@ def test_a_stop_ends_work_at_its_next_word(kit):
         worked(opened)
         assert told == [0, 1, 2]
         assert "stopped" in tasks._line.content
+
+
+def test_a_drag_pulls_and_is_recorded(kit):
+    with studio(kit) as opened:
+        worked(opened)
+        forces = opened.page.forces
+        opened.page.tasks.start("Begin", forces._begin)
+        worked(opened)
+        scene = forces._scenes["A"]
+        tree = scene.tree
+        body = len(tree.bodies) - 1
+        voxel = tree.bodies[body].voxels[-1]
+        start = tree.source[voxel] - tree.source.mean(axis=0) + scene.shift + [0.1, 0.2, 0.0]
+        assert scene.nearest_voxel(body, start) == voxel
+        dragged = forces._dragged("A")
+        dragged(body, start, start + np.array([0.0, 1.0, 0.5]), False)
+        forces._take_drag(forces.unfolding)
+        forces.unfolding.do(Wait(steps=50))
+        dragged(body, start, start + np.array([0.0, 100.0, 0.0]), False)
+        forces._take_drag(forces.unfolding)
+        dragged(body, start, start, True)
+        worked(opened)
+        forces._take_drag(forces.unfolding)
+        actions = forces.unfolding.actions
+        pushes = [action for action in actions if action.do == "push"]
+        assert [push.voxel for push in pushes] == [voxel] * 3
+        assert pushes[0].force == (0.0, 40.0, 20.0)
+        assert pushes[1].force == (0.0, 250.0, 0.0)
+        assert pushes[2].force == (0.0, 0.0, 0.0)
 
 
 def test_forces_from_the_page_make_the_kits_path(kit):

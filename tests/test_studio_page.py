@@ -148,6 +148,16 @@ def test_forces_fold_it_with_a_persons_help(studio: Any) -> None:
     left = columns < np.median(columns)
     page.mouse.click(int(np.median(columns[left])), int(np.median(rows[left])))
     page.get_by_text(re.compile(r"Voxel \d of A chosen")).wait_for(timeout=WAIT_MS)
+    # A drag pulls at once, and is recorded.
+    page.mouse.move(int(np.median(columns[left])), int(np.median(rows[left])))
+    page.mouse.down()
+    for step in range(1, 9):
+        page.mouse.move(int(np.median(columns[left])), int(np.median(rows[left])) - 12 * step)
+        page.wait_for_timeout(150)
+    page.mouse.up()
+    page.get_by_text("Pulling: done.").wait_for(timeout=WAIT_MS)
+    told = page.get_by_text(re.compile(r"\d+ actions?; A and B are up to \d+° apart")).inner_text()
+    assert int(told.split()[0]) >= 3  # a push, a wait, and the end of the push
     press(page, "push")
     press(page, "carve")
     press(page, "unfold")

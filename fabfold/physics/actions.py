@@ -19,6 +19,7 @@ __all__ = [
     "Push",
     "Release",
     "Unfold",
+    "Wait",
     "actions_json",
     "read_actions",
 ]
@@ -48,8 +49,15 @@ class Match(_Action):
     steps: Steps
 
 
+class Wait(_Action):
+    """Let only pushes and pins act."""
+
+    do: Literal["wait"] = "wait"
+    steps: Steps
+
+
 class Push(_Action):
-    """Push a voxel from now on, with a force in the frame of the body that is held."""
+    """Push a voxel from now on, with a force in the frame of the body that is held; 0 ends it."""
 
     do: Literal["push"] = "push"
     shape: Shape
@@ -79,7 +87,7 @@ class Carve(_Action):
     voxel: Voxel
 
 
-Action = Unfold | Match | Push | PinVoxel | Release | Carve
+Action = Unfold | Match | Wait | Push | PinVoxel | Release | Carve
 
 
 class _Session(BaseModel):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import RecipeError
 from fabfold.fold.core_sweep import CORE_HALF_SIDE
-from fabfold.physics.actions import Action, Carve, Match, PinVoxel, Push, Release, Unfold
+from fabfold.physics.actions import Action, Carve, Match, PinVoxel, Push, Release, Unfold, Wait
 from fabfold.physics.rig import Box, rig_model
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import WHOLE, unpacked
@@ -216,18 +216,21 @@ class Unfolding:
                 f"actions: there is no voxel {voxel}; this kit has 0 to {len(self.tree.source) - 1}"
             )
         last = self.actions[-1] if self.actions and joined else None
-        if isinstance(action, Unfold | Match) and last is not None and last.do == action.do:
+        if isinstance(action, Unfold | Match | Wait) and last is not None and last.do == action.do:
             self.actions[-1] = action.model_copy(update={"steps": last.steps + action.steps})
         else:
             self._snapshots.append(self._snapshot())
             self.actions.append(action)
-        if isinstance(action, Unfold | Match):
+        if isinstance(action, Unfold | Match | Wait):
             for step in range(action.steps):
-                self._step(attract=isinstance(action, Match))
+                self._step(action)
                 if watch is not None and step % 100 == 99:
                     watch(step + 1, action.steps)
         elif isinstance(action, Push):
-            self._copies[action.shape].pushes[action.voxel] = np.array(action.force)
+            pushes = self._copies[action.shape].pushes
+            pushes[action.voxel] = np.array(action.force)
+            if not any(action.force):
+                del pushes[action.voxel]
         elif isinstance(action, PinVoxel):
             copy = self._copies[action.shape]
             body = self.tree.voxel_body[action.voxel]
@@ -289,15 +292,18 @@ class Unfolding:
         turn = data.xmat[self._body].reshape(-1, 3, 3)
         return np.asarray(np.einsum("nij,nj->ni", turn, self.tree.source) + data.xpos[self._body])
 
-    def _step(self, *, attract: bool) -> None:
+    def _step(self, action: Unfold | Match | Wait) -> None:
         """One time step of both copies."""
         import mujoco
 
         places = {shape: self._places(copy.data) for shape, copy in self._copies.items()}
         for shape, other in (("A", "B"), ("B", "A")):
             copy, place = self._copies[shape], places[shape]
-            drawn = _ATTRACTION * (places[other] - place)
-            force = drawn if attract else repulsion(place)
+            force = np.zeros_like(place)
+            if isinstance(action, Match):
+                force = _ATTRACTION * (places[other] - place)
+            elif isinstance(action, Unfold):
+                force = repulsion(place)
             force -= _DRAG * (place - copy.place) / _TIME_STEP
             for voxel, push in copy.pushes.items():
                 force[voxel] += push

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fabfold.errors import NoFoldError
-from fabfold.physics.actions import Action, Carve, Match, PinVoxel, Push, Release, Unfold
+from fabfold.physics.actions import Action, Carve, Match, PinVoxel, Push, Release, Unfold, Wait
 from fabfold.physics.lattice_path import lattice_path
 from fabfold.physics.unfolding import Unfolding
 from fabfold.studio.kit_scene import KitScene, cube_meshes
@@ -22,6 +22,8 @@ __all__ = ["ForcePanel"]
 
 #: Time steps between two pictures.
 _STEPS = 25
+#: Force of a drag over one voxel side, and the most.
+_PULL, _MOST_PULL = 40.0, 250.0
 
 
 class ForcePanel:
@@ -49,10 +51,12 @@ class ForcePanel:
         self._tasks, self._tree, self._use = tasks, tree, use
         self._unfolding: Unfolding | None = None
         self._chosen: tuple[str, int] | None = None
+        self._drag: Push | None = None  # as the hand has it now
+        self._pulled: Push | None = None  # as the simulation has it
         gui: Any = server.gui
         gui.add_markdown(
             "A (left) and B (right) unfold by repulsion; then each is drawn to the other. Where "
-            "they stick, click a voxel and push it, pin it, or carve its corners."
+            "they stick, drag a voxel, or click one and push it, pin it, or carve its corners."
         )
         gui.add_button("Begin").on_click(lambda _: tasks.start("Forces", self._begin))
         row = gui.add_button_group("forces", ("unfold", "match", "hold"))
@@ -69,6 +73,7 @@ class ForcePanel:
         self._scenes = {shape: KitScene(server, f"/forces-{shape}") for shape in ("A", "B")}
         for shape, scene in self._scenes.items():
             scene.on_body = self._clicked(shape)
+            scene.on_drag = self._dragged(shape)
 
     @property
     def unfolding(self) -> Unfolding | None:
@@ -104,10 +109,52 @@ class ForcePanel:
         else:
             self._tasks.start("Matching", lambda: self._run(Match(steps=_STEPS), 2000))
 
+    def _pull(self) -> None:
+        """Let a drag act by itself, until the hand lets go."""
+        unfolding = self._required()
+        for done in range(1000):
+            self._take_drag(unfolding)
+            if self._pulled is None:
+                break
+            unfolding.do(Wait(steps=_STEPS), joined=done > 0)
+            self._draw()
+            self._tasks.tell(None, self._words())
+
+    def _take_drag(self, unfolding: Unfolding) -> None:
+        """Push as the hand drags now; each change is an action, so that it can be replayed."""
+        drag, before = self._drag, self._pulled
+        if drag == before:
+            return
+        if before is not None and (drag is None or drag.voxel != before.voxel):
+            unfolding.do(before.model_copy(update={"force": (0.0, 0.0, 0.0)}))
+        if drag is not None:
+            unfolding.do(drag)
+        self._pulled = drag
+
+    def _dragged(self, shape: str) -> Callable[[int, Any, Any, bool], None]:
+        def dragged(body: int, start: Any, end: Any, over: bool) -> None:
+            scene = self._scenes[shape]
+            voxel = scene.nearest_voxel(body, start)
+            if self._drag is not None:
+                voxel = self._drag.voxel  # The one that was taken hold of.
+            if over or voxel is None or self._unfolding is None:
+                self._drag = None
+                return
+            force = _PULL * (end - start)
+            force *= min(1.0, _MOST_PULL / max(float(np.linalg.norm(force)), 1e-9))
+            x, y, z = (round(float(value), 3) for value in force)
+            first = self._drag is None
+            self._drag = Push(shape=shape, voxel=voxel, force=(x, y, z))  # type: ignore[arg-type]
+            if first and not self._tasks.busy:
+                self._tasks.start("Pulling", self._pull)
+
+        return dragged
+
     def _run(self, action: Unfold | Match, steps: int) -> None:
         """Let a force act, a picture every few steps, until it is held or has done its time."""
         unfolding = self._required()
         for done in range(0, steps, _STEPS):
+            self._take_drag(unfolding)
             unfolding.do(action, joined=done > 0)
             self._draw()
             self._tasks.tell((done + _STEPS) / steps, self._words())

@@ -94,6 +94,9 @@ class KitScene:
         self.on_body: Callable[[int, F64, F64], None] | None = None
         #: Told of the hinge that is clicked.
         self.on_hinge: Callable[[int], None] | None = None
+        #: Told of the body that is dragged, from where to where, and whether that is the end. Where
+        #: nobody is told, a drag turns the view.
+        self.on_drag: Callable[[int, F64, F64, bool], None] | None = None
 
     @property
     def tree(self) -> FoldTree | None:
@@ -140,6 +143,8 @@ class KitScene:
                 visible=self._visible,
             )
             handle.on_click(self._clicked_body(index))
+            if self.on_drag is not None:
+                handle.on_drag(self._dragged_body(index))
             self._bodies.append(handle)
         for index, hinge in enumerate(tree.hinges if hinges else ()):
             along, middle = np.abs(np.array(hinge.direction)), np.array(hinge.point)
@@ -165,6 +170,14 @@ class KitScene:
                 self.on_body(index, np.array(event.ray_origin), np.array(event.ray_direction))
 
         return clicked
+
+    def _dragged_body(self, index: int) -> Callable[[Any], None]:
+        def dragged(event: Any) -> None:
+            if self.on_drag is not None:
+                start, end = np.array(event.start_position), np.array(event.end_position)
+                self.on_drag(index, start, end, event.phase == "end")
+
+        return dragged
 
     def _clicked_hinge(self, index: int) -> Callable[[Any], None]:
         def clicked(_: Any) -> None:
@@ -207,6 +220,16 @@ class KitScene:
     def picked(self) -> frozenset[int]:
         """Bodies that are picked out."""
         return self._picked
+
+    def nearest_voxel(self, body: int, point: F64) -> int | None:
+        """Voxel of a body whose middle is nearest to a point of the scene; None for a plate."""
+        if self._tree is None or not self._tree.bodies[body].voxels:
+            return None
+        pose = self._tree.body_poses(self._angles)[body]
+        here = pose[:3, :3].T @ (point - self.shift + self._middle - pose[:3, 3])
+        voxels = list(self._tree.bodies[body].voxels)
+        away = np.linalg.norm(self._tree.source[voxels] - here, axis=1)
+        return voxels[int(away.argmin())]
 
     def voxel_at(self, body: int, start: F64, along: F64) -> int | None:
         """Voxel of a body that a ray of the scene meets first, None where it meets none."""
