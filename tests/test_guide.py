@@ -6,6 +6,8 @@ import re
 import shutil
 import subprocess
 import zipfile
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,10 +17,11 @@ import numpy as np
 import pytest
 
 from fabfold.export.camera import View, direction_frame, project
-from fabfold.guide.fold_steps import turned
+from fabfold.guide.fold_steps import gathered, turned
 from fabfold.guide.manual import STEP_PIXELS, plan_steps
 from fabfold.guide.step_drawing import MOVING, STAYING, draw_step
 from fabfold.guide.step_views import _blocks, visible_share
+from fabfold.guide.wording import step_text
 from fabfold.joinery.body_poses import poses_in_mm
 
 #: Least share of what moves that must be seen at the start of a step, and pixels that it covers.
@@ -42,6 +45,13 @@ def drawn(kit: SimpleNamespace) -> list[Any]:
     return [
         draw_step(kit.meshes, step, view, kit.joinery.voxel_mm, STEP_PIXELS) for step, view in pairs
     ]
+
+
+def phases(kit: SimpleNamespace, drawn: list[Any]) -> Iterator[tuple[Any, Any, Any]]:
+    """Every picture of turns that are made at once: step, view, picture."""
+    for step, view, picture in zip(kit.plan.groups, kit.plan.group_views, drawn, strict=False):
+        for phase, panel in zip(step.phases, picture.panels or (picture,), strict=True):
+            yield phase, view, panel
 
 
 def relative(poses: np.ndarray) -> np.ndarray:
@@ -79,7 +89,7 @@ def test_half_of_a_step_is_half_of_its_turn(kit: SimpleNamespace) -> None:
 
 def test_what_moves_is_seen(kit: SimpleNamespace, drawn: list[Any]) -> None:
     blocks = _blocks(kit.joinery, kit.tree)
-    for step, view, picture in zip(kit.plan.groups, kit.plan.group_views, drawn, strict=False):
+    for step, view, picture in phases(kit, drawn):
         look = View(view.azimuth_deg, view.elevation_deg, size=(224, 168))
         before, after = blocks.posed(step.before), blocks.posed(step.after)
         moving = np.isin(blocks.body, step.all_moving)[blocks.faces[:, 0]]
@@ -101,7 +111,7 @@ def test_what_moves_is_seen(kit: SimpleNamespace, drawn: list[Any]) -> None:
 
 
 def test_the_arrows_turn_as_the_hinges_do(kit: SimpleNamespace, drawn: list[Any]) -> None:
-    for step, view, picture in zip(kit.plan.groups, kit.plan.group_views, drawn, strict=False):
+    for step, view, picture in phases(kit, drawn):
         height, width = picture.image.shape[:2]
         away = direction_frame(view.azimuth_deg, view.elevation_deg)[2]
         assert len(picture.arrows) == len(picture.labels) == len(step.turns)
@@ -119,8 +129,10 @@ def test_the_arrows_turn_as_the_hinges_do(kit: SimpleNamespace, drawn: list[Any]
             assert np.sign(cross.sum()) == -np.sign(towards), step.number
 
 
-def test_angles_stand_inside_the_picture_and_beside_the_arrow_heads(drawn: list[Any]) -> None:
-    for picture in drawn:
+def test_angles_stand_inside_the_picture_and_beside_the_arrow_heads(
+    kit: SimpleNamespace, drawn: list[Any]
+) -> None:
+    for _, _, picture in phases(kit, drawn):
         height, width = picture.image.shape[:2]
         for (left, top, right, bottom), arrow in zip(picture.labels, picture.arrows, strict=True):
             assert 0 <= left < right <= width
@@ -136,23 +148,56 @@ def test_angles_stand_inside_the_picture_and_beside_the_arrow_heads(drawn: list[
 def test_merged_steps_are_those_that_were_proven(kit: SimpleNamespace) -> None:
     """Groups hold every move once, in order; their parts have no body in common."""
     proven = [tuple(pair) for pair in kit.motion.certificate["any_order"]]
-    assert sum(len(group.turns) for group in kit.plan.groups) == len(kit.plan.steps)
+    sizes = [len(group.turns) + len(group.then) for group in kit.plan.groups]
+    assert sum(sizes) == len(kit.plan.steps)
     at = 0
     merged = []
     for number, group in enumerate(kit.plan.groups, start=1):
         assert group.number == number
-        size = len(group.turns)
+        size = len(group.turns) + len(group.then)
         mine = kit.plan.steps[at : at + size]
-        assert [turn.hinge for turn in group.turns] == [step.hinge for step in mine]
+        turns = (*group.turns, *group.then)
+        assert [turn.hinge for turn in turns] == [step.hinge for step in mine]
         assert len(set(group.all_moving)) == len(group.all_moving)
         assert np.allclose(group.before, mine[0].before)
-        assert np.allclose(group.after, mine[-1].after)
-        assert np.allclose(turned(group, 1.0), mine[-1].after, atol=1e-9)
-        if size > 1:
+        assert np.allclose(group.phases[-1].after, mine[-1].after)
+        for one, other in pairwise(group.phases):
+            assert np.array_equal(one.after, other.before)
+        if group.also:
+            assert np.allclose(turned(group, 1.0), mine[-1].after, atol=1e-9)
             merged.append((at + 1, at + size))
         at += size
     assert set(merged) <= set(proven)
     assert merged
+
+
+def test_turns_of_one_small_part_are_one_picture_of_cut_outs(kit: SimpleNamespace) -> None:
+    """Three turns of the last part are gathered; those of larger parts are not."""
+    steps = list(kit.plan.steps)
+    small = np.array([1.0 if body in steps[0].moving else 50.0 for body in range(4)])
+    one = replace(steps[0], moving=tuple(steps[0].moving))
+    run = [replace(one, number=number) for number in (1, 2, 3)]
+    (step,) = gathered(run, small)
+    assert len(step.phases) == 3
+    assert "a) " in step_text(step)
+    assert "c) " in step_text(step)
+    assert len(gathered(run, np.ones(4))) == 3
+    # What follows on another part, and what may be made in any order, stays by itself.
+    other = replace(one, moving=tuple(set(range(4)) - set(one.moving)))
+    assert len(gathered([one, replace(other, number=2)], np.array([1.0, 1, 1, 1]))) == 2
+    assert len(gathered([replace(one, also=(one,)), one], small)) == 2
+    view = kit.plan.views[0]
+    picture = draw_step(kit.meshes, step, view, kit.joinery.voxel_mm, (300, 226))
+    assert picture.image.shape == (226, 300, 3)
+    assert len(picture.panels) == 3
+    for panel in picture.panels:
+        assert panel.image.shape == (452, 600, 3)
+    # Each cell shows what moves, and the fourth is empty.
+    red = picture.image[..., 0].astype(int) > 1.6 * picture.image[..., 1].astype(int)
+    assert red[:113, :150].sum() > 200
+    assert red[:113, 150:].sum() > 200
+    assert red[113:, :150].sum() > 200
+    assert (picture.image[120:, 160:] == 255).all()
 
 
 def words_of(pdf: Path) -> list[list[tuple[float, ...]]]:

@@ -15,7 +15,10 @@ from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.lattice.rotations import rotation_about
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["FoldStep", "fold_steps", "grouped", "turned"]
+__all__ = ["FoldStep", "fold_steps", "gathered", "grouped", "turned"]
+
+#: Share of the kit's material up to which a part is small, and turns that are gathered at most.
+_SMALL_SHARE, _MOST_GATHERED = 0.15, 4
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ class FoldStep:
     also : tuple of FoldStep
         Turns of other parts that belong to the step and may be made in any order with this one;
         all begin where it begins.
+    then : tuple of FoldStep
+        Further turns of the same small part, which follow one after the other.
     """
 
     number: int
@@ -56,6 +61,12 @@ class FoldStep:
     before: NDArray[np.float64]
     after: NDArray[np.float64]
     also: tuple[FoldStep, ...] = ()
+    then: tuple[FoldStep, ...] = ()
+
+    @property
+    def phases(self) -> tuple[FoldStep, ...]:
+        """What follows one after the other in the step, its own turns first."""
+        return (replace(self, then=()), *self.then)
 
     @property
     def turns(self) -> tuple[FoldStep, ...]:
@@ -118,6 +129,40 @@ def grouped(steps: Sequence[FoldStep], any_order: Sequence[Sequence[int]]) -> li
         )
         out.append(replace(first, number=len(out) + 1, after=group[-1].after, also=also))
         at = end + 1
+    return out
+
+
+def gathered(steps: Sequence[FoldStep], volume: NDArray[np.float64]) -> list[FoldStep]:
+    """Steps with those that follow one another on one small part gathered in one.
+
+    Parameters
+    ----------
+    steps : sequence of FoldStep
+        See :func:`grouped`.
+    volume : (b,) float64 array
+        Of every body.
+
+    Returns
+    -------
+    list of FoldStep
+        Numbered from 1.
+    """
+    most = _SMALL_SHARE * float(volume.sum())
+    out: list[FoldStep] = []
+    at = 0
+    while at < len(steps):
+        part: set[int] = set()
+        end = at
+        while end < len(steps) and end - at < _MOST_GATHERED and not steps[end].also:
+            wider = part | set(steps[end].moving)
+            if part and not part & set(steps[end].moving):
+                break
+            if volume[sorted(wider)].sum() > most:
+                break
+            part, end = wider, end + 1
+        end = max(end, at + 1)
+        out.append(replace(steps[at], number=len(out) + 1, then=tuple(steps[at + 1 : end])))
+        at = end
     return out
 
 

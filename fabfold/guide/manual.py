@@ -13,7 +13,7 @@ from fabfold.export.kit_picture import nearest_lattice, picture_of_kit
 from fabfold.export.render import Image, render
 from fabfold.export.shading import corner_normals
 from fabfold.fold.motion import Motion
-from fabfold.guide.fold_steps import FoldStep, fold_steps, grouped
+from fabfold.guide.fold_steps import FoldStep, fold_steps, gathered, grouped
 from fabfold.guide.step_drawing import StepPicture, draw_step
 from fabfold.guide.step_views import LEAST_SEEN, StepView, step_views
 from fabfold.guide.wording import step_text
@@ -42,7 +42,8 @@ class StepPlan:
     views : tuple of StepView
         One for each, and one for the end.
     groups : tuple of FoldStep
-        The same with those merged that may be made in any order: the pictures of a manual.
+        The same with those merged that may be made in any order, and those gathered that follow
+        each other on one small part: the pictures of a manual.
     group_views : tuple of StepView
         One for each of these, and one for the end.
     """
@@ -136,21 +137,23 @@ def plan_steps(
     """
     stand = nearest_lattice(upright)
     steps = fold_steps(joinery, tree, motion, stand)
+    volume = np.array([body.volume for body in joinery.bodies])
     merged = [tuple(pair) for pair in motion.certificate.get("any_order", ())]
-    groups = grouped(steps, merged)
+    groups = gathered(grouped(steps, merged), volume)
     seen = step_views(joinery, tree, groups)
     at, hidden = 1, []
     for group, view in zip(groups, seen, strict=False):
         if group.also and view.seen < LEAST_SEEN:
             hidden.append((at, at + len(group.also)))
-        at += len(group.turns)
+        at += len(group.turns) + len(group.then)
     if hidden:  # No view shows all that moves: each turn gets a picture of its own.
-        groups = grouped(steps, [pair for pair in merged if pair not in hidden])
+        merged = [pair for pair in merged if pair not in hidden]
+        groups = gathered(grouped(steps, merged), volume)
         seen = step_views(joinery, tree, groups)
     views = [
         replace(view, turned=view.turned and number == 0)
         for group, view in zip(groups, seen, strict=False)
-        for number in range(len(group.turns))
+        for number in range(len(group.turns) + len(group.then))
     ]
     return StepPlan(stand, tuple(steps), (*views, seen[-1]), tuple(groups), tuple(seen))
 

@@ -53,12 +53,15 @@ class StepPicture:
         The line of each turn's arrow, from its tail to its head, in pixels.
     labels : tuple of four floats each
         Left, top, right and bottom of the angle that is written beside each, in pixels.
+    panels : tuple of StepPicture
+        Of turns that follow one after the other: the picture of each, of which a cut-out is shown.
     """
 
     image: Image
     camera: PinholeCamera
     arrows: tuple[NDArray[np.float64], ...]
     labels: tuple[Box2, ...]
+    panels: tuple[StepPicture, ...] = ()
 
 
 def arrow_points(
@@ -131,6 +134,8 @@ def draw_step(
     StepPicture
         The picture, and where its arrow and label are.
     """
+    if step.then:
+        return _draw_callout(meshes, step, view, voxel_mm, size, smooth)
     arcs = [arrow_points(turn, meshes, voxel_mm) for turn in step.turns]
     after = posed_points(meshes, step.after)
     within = np.concatenate([after, *arcs])
@@ -155,6 +160,63 @@ def draw_step(
         arrows.append(arrow)
         labels.append(label)
     return StepPicture(image, camera, tuple(arrows), tuple(labels))
+
+
+def _draw_callout(
+    meshes: Sequence[Mesh],
+    step: FoldStep,
+    view: StepView,
+    voxel_mm: float,
+    size: tuple[int, int],
+    smooth: Sequence[NDArray[np.float64]] | None,
+) -> StepPicture:
+    """Turns of a small part one after the other, each as a cut-out of a larger picture."""
+    from PIL import Image as PillowImage
+    from PIL import ImageDraw, ImageFont
+
+    count = len(step.phases)
+    across = 1 if count == 2 else 2
+    cell = (size[0] // across, size[1] // -(-count // across))
+    large = (2 * size[0], 2 * size[1])
+    sheet = PillowImage.new("RGB", size, (255, 255, 255))
+    draw = ImageDraw.Draw(sheet)
+    font = ImageFont.truetype(str(font_file(bold=True)), round(size[1] / 20))
+    panels = []
+    for number, phase in enumerate(step.phases):
+        panel = draw_step(meshes, phase, view, voxel_mm, large, smooth)
+        panels.append(panel)
+        left, top = cell[0] * (number % across), cell[1] * (number // across)
+        window = _cut_out(panel, meshes, phase, cell)
+        shown = PillowImage.fromarray(panel.image).crop(window)
+        sheet.paste(shown.resize(cell, PillowImage.Resampling.LANCZOS), (left, top))
+        frame = (left + 2, top + 2, left + cell[0] - 3, top + cell[1] - 3)
+        draw.rounded_rectangle(frame, radius=9, outline=(150, 150, 150), width=2)
+        draw.text((left + 12, top + 6), "abcd"[number], font=font, fill=(20, 20, 20))
+    return StepPicture(np.asarray(sheet), panels[0].camera, (), (), tuple(panels))
+
+
+def _cut_out(
+    panel: StepPicture, meshes: Sequence[Mesh], step: FoldStep, cell: tuple[int, int]
+) -> tuple[int, int, int, int]:
+    """Window of a panel about what moves, its arrow and its angle, in the shape of a cell."""
+    moving = list(step.moving)
+    parts = [meshes[body] for body in moving]
+    points = [
+        project(posed_points(parts, poses[moving]), panel.camera)[:, :2]
+        for poses in (step.before, step.after)
+    ]
+    labels = np.array(panel.labels).reshape(-1, 2)
+    spots = np.concatenate([*points, *panel.arrows, labels])
+    height, width = panel.image.shape[:2]
+    low, high = spots.min(axis=0), spots.max(axis=0)
+    middle = (low + high) / 2
+    wide, tall = (high - low) * 1.5
+    # No nearer than life size, no farther than the whole picture.
+    scale = min(max(wide / cell[0], tall / cell[1], 1.0), width / cell[0], height / cell[1])
+    wide, tall = scale * cell[0], scale * cell[1]
+    x = float(np.clip(middle[0] - wide / 2, 0, width - wide))
+    y = float(np.clip(middle[1] - tall / 2, 0, height - tall))
+    return round(x), round(y), round(x + wide), round(y + tall)
 
 
 def _owners(

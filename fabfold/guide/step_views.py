@@ -183,7 +183,10 @@ def step_views(joinery: Joinery, tree: FoldTree, steps: Sequence[FoldStep]) -> l
     views: list[StepView] = []
     now = (FIRST_VIEW.azimuth_deg, FIRST_VIEW.elevation_deg)
     for step in steps:
-        found = {direction: _score(blocks, step, direction) for direction in _directions()}
+        found = {}
+        for direction in _directions():
+            scores = [_score(blocks, phase, direction) for phase in step.phases]
+            found[direction] = (min(s for s, _ in scores), min(seen for _, seen in scores))
         best = max(found, key=lambda direction: found[direction][0])
         score, seen = found[now]
         turn = score * _WORTH_TURNING < found[best][0] or seen < LEAST_SEEN < found[best][1]

@@ -31,6 +31,10 @@ def step_text(step: FoldStep, *, brief: bool = False) -> str:
     brief : bool
         Whether to say how many parts turn together, in place of their numbers.
     """
+    if step.then:
+        told = [_turn_text(phase, brief).lower() for phase in step.phases]
+        letters = [f"{letter}) {text}" for letter, text in zip("abcd", told, strict=False)]
+        return f"One after the other: {'; '.join(letters)}"
     if step.also:
         told = [_turn_text(turn, brief).lower() for turn in step.turns]
         return f"In any order: {'; '.join(told)}"
