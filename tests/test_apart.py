@@ -21,10 +21,10 @@ from fabfold.joinery.booleans import union
 from fabfold.joinery.build import build_bodies
 from fabfold.joinery.cells import as_manifold
 from fabfold.joinery.loose_pins import meshes_with_pins, pin_bores
-from fabfold.kit.kit import Kit
+from fabfold.kit.kit import Kit, open_kit
 from fabfold.kit.stage_files import load_built, save_built
 from fabfold.printing.print_mode import print_mode
-from fabfold.printing.profiles import load_profile
+from fabfold.printing.profiles import load_profile, profiles_folder
 from fabfold.progress import SilentProgress
 from fabfold.proof.certify import certify
 
@@ -457,3 +457,41 @@ def test_what_was_seen_comes_back_with_the_kit(kit_folder):
     built = kit_folder[0].join()
     again = load_built(kit_folder[0]._store, save_built(kit_folder[0]._store, built))
     assert again.apart.replay == built.apart.replay
+
+
+def test_the_largest_voxel_that_a_bed_holds(bar_kit):
+    """The bar of 8 voxels in one piece, and its bodies of 2 by themselves."""
+    from fabfold.kit.bed_fit import largest_voxel
+
+    tree = bar_kit.fold().tree
+    mode = bar_kit.print_mode()
+    small = replace(mode, profile=mode.profile.model_copy(update={"bed_mm": (120.0, 100.0, 90.0)}))
+    assert largest_voxel(tree, small) == pytest.approx(np.floor(1200 / 8.3) / 10)
+    none = replace(mode, profile=mode.profile.model_copy(update={"bed_mm": None}))
+    assert largest_voxel(tree, none) is None
+    longest = max(np.ptp(tree.source[list(body.voxels)], axis=0).max() + 1 for body in tree.bodies)
+    apart = replace(small, apart=True)
+    assert largest_voxel(tree, apart) == pytest.approx(np.floor(10 * 110 / (longest + 0.3)) / 10)
+
+
+@pytest.mark.slow
+def test_a_kit_is_made_to_fit_a_small_bed(bar, tmp_path, capsys):
+    """With --fit-bed the closed kit lies within the build volume; without it the check fails."""
+    from fabfold.cli.app import main
+
+    text = (profiles_folder() / "mjf-pa12.toml").read_text(encoding="utf-8")
+    own = tmp_path / "small.toml"
+    text = text.replace("bed_mm = [380.0, 284.0, 380.0]", "bed_mm = [140.0, 60.0, 60.0]")
+    own.write_text(text.replace('name = "mjf-pa12"', 'name = "small"'), encoding="utf-8")
+    options = ["-t", "box-2x2x2", "--effort", "quick", "--profile", str(own), "-q", "-j", "1"]
+    for more, code in (([], 1), (["--fit-bed"], 0)):
+        with pytest.raises(SystemExit) as stopped:
+            main(["check", str(bar), "-o", str(tmp_path / "kit"), *options, *more])
+        assert (stopped.value.code or 0) == code
+    assert "16.8 mm voxels fit the bed" in capsys.readouterr().err
+    kit = open_kit(str(tmp_path / "kit"))
+    assert kit.recipe.voxel_mm == 16.8
+    joinery = kit.join().joinery
+    low = np.min([body.vertices.min(axis=0) for body in joinery.bodies], axis=0)
+    high = np.max([body.vertices.max(axis=0) for body in joinery.bodies], axis=0)
+    assert (np.sort(high - low) <= np.sort([140.0, 60.0, 60.0])).all()

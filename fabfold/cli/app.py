@@ -21,6 +21,7 @@ from fabfold.cli.command_options import (
     DoubleWeight,
     DropBelow,
     Effort,
+    FitBed,
     Joints,
     JointsInside,
     Json,
@@ -163,6 +164,7 @@ def _stage(name: str, summary: str) -> None:
         voxel_mm: VoxelMm = None,
         box_mm: BoxMm = None,
         scale: Scale = None,
+        fit_bed: FitBed = False,
         profile: ProfileName = None,
         clearance_mm: ClearanceMm = None,
         print: Print = None,
@@ -198,7 +200,7 @@ def _stage(name: str, summary: str) -> None:
         quiet: Quiet = False,
     ) -> None:
         options = dict(locals())
-        for key in ("name", "summary", "pareto", "as_json"):
+        for key in ("name", "summary", "pareto", "as_json", "fit_bed"):
             options.pop(key, None)
         if name == "check" and output is None and _is_model_file(source):
             _check_file(Path(source), profile, as_json=as_json, quiet=quiet)
@@ -210,6 +212,8 @@ def _stage(name: str, summary: str) -> None:
         if pareto:
             _show_pareto(kit, name)
             return
+        if fit_bed:
+            kit = _fitted(kit, options)
         kit.run(name)
         from fabfold.cli.console import show_checks, show_result
 
@@ -223,6 +227,17 @@ def _stage(name: str, summary: str) -> None:
 
     command.__name__ = name
     app.command(name, help=summary)(_guarded(command))
+
+
+def _fitted(kit: Kit, options: dict[str, Any]) -> Kit:
+    """The kit, or the same with smaller voxels where its printer's bed does not hold it."""
+    from fabfold.kit.bed_fit import fitting_voxel
+
+    voxel = fitting_voxel(kit)
+    if voxel is None:
+        return kit
+    typer.echo(f"fabfold: {voxel:g} mm voxels fit the bed of {kit.recipe.profile}", err=True)
+    return _kit(**{**options, "voxel_mm": voxel, "box_mm": None, "scale": None})
 
 
 def _checks(kit: Kit, stage: str) -> list[Check]:
@@ -371,19 +386,12 @@ def studio(
     ] = True,
 ) -> None:
     """Look at a kit and change it on a page, served to this machine only."""
-    import webbrowser
-
     from fabfold.studio.serve import serve
 
-    served = serve(source, None if output is None else str(output), port)
-    try:
+    with serve(source, None if output is None else str(output), port) as served:
         typer.echo(f"studio: {served.gate.address}\nCtrl-C ends it; every step is kept in the kit.")
         sys.stdout.flush()
-        if browser:
-            webbrowser.open(served.gate.address)
-        served.page.tasks.run()
-    finally:
-        served.close()
+        served.run(browser=browser)
 
 
 @app.command("list")

@@ -15,6 +15,7 @@ __all__ = [
     "DoubleWeight",
     "DropBelow",
     "Effort",
+    "FitBed",
     "Joints",
     "JointsInside",
     "Json",
@@ -164,6 +165,14 @@ Closed = Annotated[
         "--closed",
         help="Search until the box is closed to this share, such as 0.85, or say it cannot be.",
         show_default=False,
+    ),
+]
+FitBed = Annotated[
+    bool,
+    typer.Option(
+        "--fit-bed",
+        help="Make the kit smaller where it, or its largest body printed apart, is too large for "
+        "the printer.",
     ),
 ]
 Method = Annotated[

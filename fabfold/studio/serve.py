@@ -27,13 +27,28 @@ class Studio:
     steps : StudioSteps
         The kit.
     close : callable
-        Stops serving.
+        Stops serving; leaving a ``with`` does so too.
     """
 
     gate: Gate
     page: StudioPage
     steps: StudioSteps
     close: Callable[[], None]
+
+    def run(self, *, browser: bool = False) -> None:
+        """Do what the page asks for, until it is ended; with `browser` open it first."""
+        import webbrowser
+
+        if browser:
+            webbrowser.open(self.gate.address)
+        self.page.tasks.run()
+
+    def __enter__(self) -> Studio:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop serving."""
+        self.close()
 
 
 def serve(source: str, folder: str | None = None, port: int = 0) -> Studio:
