@@ -80,8 +80,9 @@ def lay_out_knuckles(
     margin: float,
     owners: Sequence[int] = (0, 1),
     pin_owner: int = 0,
+    ratio: float = 1.0,
 ) -> KnuckleLayout:
-    """Divide an edge among knuckles of equal length.
+    """Divide an edge among knuckles.
 
     Parameters
     ----------
@@ -99,6 +100,8 @@ def lay_out_knuckles(
         Owners of the knuckles, repeated along the edge: parent and child in turn by default.
     pin_owner : int
         Number of the body that carries printed pins, and grips a loose one.
+    ratio : float
+        Length of a knuckle of the others against one of the first owner; 1 makes all equal.
 
     Returns
     -------
@@ -118,19 +121,21 @@ def lay_out_knuckles(
             f"margin {margin:g} mm must not be negative"
         )
     room = length - 2.0 * margin - (count - 1) * clearance.axial
-    each = room / count
-    if each <= 0.0:
+    if room <= 0.0:
         raise HingeError(
             f"{count} knuckles do not fit an edge of {length:g} mm with {margin:g} mm left free at "
             "each end: use fewer knuckles, a smaller barrel or a longer edge"
         )
-    first = -0.5 * length + margin
-    pitch = each + clearance.axial
-    knuckles = tuple(
-        Knuckle(owners[i % len(owners)], first + i * pitch, first + i * pitch + each)
-        for i in range(count)
-    )
-    return KnuckleLayout(radius, knuckles, clearance, pin_owner)
+    whose = [owners[i % len(owners)] for i in range(count)]
+    shares = [1.0 if owner == owners[0] else ratio for owner in whose]
+    each = room / sum(shares)
+    knuckles = []
+    done = 0.0  # Shares of the knuckles before.
+    for i, (owner, share) in enumerate(zip(whose, shares, strict=True)):
+        start = -0.5 * length + margin + done * each + i * clearance.axial
+        knuckles.append(Knuckle(owner, start, start + share * each))
+        done += share
+    return KnuckleLayout(radius, tuple(knuckles), clearance, pin_owner)
 
 
 def groove(layout: KnuckleLayout, owner: int, core: float) -> Turned:

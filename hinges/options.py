@@ -94,6 +94,7 @@ class SingleHingeKeywords(BarrelKeywords, total=False):
     """Keywords of a single hinge."""
 
     knuckles: int
+    ratio: float
     leaf: Bracket | Leaf | None
     angle: float
     angular_range: tuple[float, float]
@@ -109,6 +110,7 @@ class SingleHingeOptions(BarrelOptions):
     """Values of :class:`SingleHingeKeywords`."""
 
     knuckles: int = 3
+    ratio: float = 1.0
     leaf: Bracket | Leaf | None = None
     angle: float = 0.0
     angular_range: tuple[float, float] = (0.0, 180.0)
@@ -122,6 +124,11 @@ class SingleHingeOptions(BarrelOptions):
         """Refuse what is no angle, no range, no leaf, no stops and no detents."""
         super().__post_init__()
         number(self.angle, "angle")
+        if not 0.1 <= number(self.ratio, "ratio") <= 10.0:
+            raise HingeError(
+                f"ratio is {self.ratio:g}: give the length of a knuckle of the child against one "
+                "of the parent, 0.1 to 10"
+            )
         words = "the lowest and the highest angle in degrees, such as (0, 110)"
         _require_pair(self.angular_range, "angular_range", words)
         if number(self.closed, "closed") not in (0.0, 180.0):

@@ -40,6 +40,8 @@ class SingleSpec(BarrelSpec):
         Lugs that end the turn.
     detents : Detents or None
         Angles at which the hinge clicks.
+    ratio : float
+        Length of a knuckle of the child against one of the parent.
     """
 
     length: float
@@ -48,6 +50,7 @@ class SingleSpec(BarrelSpec):
     angular_range: tuple[float, float]
     stops: Stops | None
     detents: Detents | None
+    ratio: float = 1.0
 
     @classmethod
     def read(cls, length: float | str, **keywords: Unpack[SingleHingeKeywords]) -> SingleSpec:
@@ -83,6 +86,7 @@ class SingleSpec(BarrelSpec):
             angular_range=(float(low), float(high)),
             stops=stops,
             detents=_detents(options),
+            ratio=float(options.ratio),
             **sizes,
         )
 
@@ -176,7 +180,9 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
     HingeError
         If a parameter makes no sense.
     """
-    layout = lay_out_knuckles(spec.length, spec.knuckles, spec.radius, spec.clearance, spec.margin)
+    layout = lay_out_knuckles(
+        spec.length, spec.knuckles, spec.radius, spec.clearance, spec.margin, ratio=spec.ratio
+    )
     if not 0.0 < spec.gap <= 2.0 * spec.radius:
         raise HingeError(f"gap {spec.gap:g} mm must be above 0 and at most the barrel's thickness")
     check_gap(spec)

@@ -86,6 +86,8 @@ class SingleHinge(PlacedPart):
         Length of the edge that the hinge is for: in mm, or with a unit such as "2 in".
     knuckles : int
         Number of knuckles, 2 or more. With an odd count the parent has one more than the child.
+    ratio : float
+        Length of a knuckle of the child against one of the parent.
     radius : float, optional
         Radius of the barrel in mm. It follows from the length, or from the pin, when left out.
     pin : Pin, optional
@@ -164,6 +166,7 @@ class SingleHinge(PlacedPart):
         length: float | str,
         *,
         knuckles: int = 3,
+        ratio: float = 1.0,
         radius: float | None = None,
         pin: Pin | None = None,
         clearance: Clearance | float | str = "fdm",
@@ -187,6 +190,7 @@ class SingleHinge(PlacedPart):
     ) -> None:
         asked: SingleHingeKeywords = {
             "knuckles": knuckles,
+            "ratio": ratio,
             "radius": radius,
             "pin": pin,
             "clearance": clearance,

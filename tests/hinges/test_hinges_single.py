@@ -5,6 +5,7 @@ import inspect
 import subprocess
 import sys
 from dataclasses import fields
+from itertools import pairwise
 from math import pi
 from pathlib import Path
 
@@ -385,3 +386,26 @@ def test_the_hinge_moves_with_a_location():
     hinge = SingleHinge(20, clearance=0.3)
     moved = Location((5, 0, 0)) * hinge
     assert pytest.approx(hinge.center().X + 5) == moved.center().X
+
+
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
+def test_knuckles_of_the_child_may_be_longer_or_shorter(ratio):
+    hinge = SingleHinge(40, knuckles=5, ratio=ratio, clearance=0.3)
+    lengths = [knuckle.length for knuckle in hinge.plan.layout.knuckles]
+    assert lengths[1] == pytest.approx(ratio * lengths[0])
+    assert lengths[0] == pytest.approx(lengths[2])
+    assert lengths[1] == pytest.approx(lengths[3])
+    gaps = [after.start - before.end for before, after in pairwise(hinge.plan.layout.knuckles)]
+    assert gaps == pytest.approx([hinge.spec.clearance.axial] * 4)
+    even = SingleHinge(40, knuckles=5, clearance=0.3).plan.layout
+    assert (hinge.plan.layout.start, hinge.plan.layout.end) == pytest.approx((even.start, even.end))
+    parent, child = mesh_of(hinge.plan.parent), mesh_of(hinge.plan.child)
+    for angle in (0.0, 70.0, 180.0):
+        assert gap(parent, turned(child, angle)) == pytest.approx(0.3, abs=2e-3)
+    assert "ratio=" in repr(hinge)
+
+
+@pytest.mark.parametrize("ratio", [0.0, -1.0, 11.0, float("nan")])
+def test_a_ratio_that_makes_no_sense_is_refused(ratio):
+    with pytest.raises(HingeError, match="ratio"):
+        SingleHinge(40, ratio=ratio)
