@@ -18,6 +18,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     # For editors and type checkers; when it runs, names are imported on first use.
+    from .ball_socket import BallSocket as BallSocket
     from .clearance import Clearance as Clearance
     from .double import DoubleHinge as DoubleHinge
     from .double import DoubleHingeCarve as DoubleHingeCarve
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from .joint_play import total_play as total_play
     from .leaf import Bracket as Bracket
     from .leaf import Leaf as Leaf
+    from .living_hinge import LivingHinge as LivingHinge
     from .print_files import write_3mf as write_3mf
     from .print_files import write_step as write_step
     from .printed_pins import ConePin as ConePin
@@ -53,6 +55,7 @@ if TYPE_CHECKING:
 
 #: The module that each public name lives in.
 _HOMES = {
+    "BallSocket": "ball_socket",
     "Bracket": "leaf",
     "Clearance": "clearance",
     "ConePin": "printed_pins",
@@ -68,6 +71,7 @@ _HOMES = {
     "HingeHalf": "single",
     "KernelError": "exceptions",
     "Leaf": "leaf",
+    "LivingHinge": "living_hinge",
     "Magnet": "retention",
     "MagnetPocket": "retention",
     "Play": "joint_play",
