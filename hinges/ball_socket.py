@@ -86,7 +86,7 @@ class BallSocket:
     --------
     >>> joint = BallSocket(6, clearance=0.3, swing=25)
     >>> round(joint.mouth, 2), round(joint.retention, 2)
-    (5.22, 0.78)
+    (5.06, 0.94)
     """
 
     def __init__(

@@ -105,11 +105,6 @@ def write_3mf(
     ------
     HingeError
         If there is no part, one has no solid, or a name or colour makes no sense.
-
-    Examples
-    --------
-    >>> from build123d import Box, Pos
-    >>> written = write_3mf([Box(1, 1, 1), Pos(2) * Box(1, 1, 1)], "two.3mf", names=["box", "lid"])
     """
     file = _checked(path, ".3mf")
     if slicer not in ("prusa", "bambu"):
