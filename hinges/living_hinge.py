@@ -150,8 +150,8 @@ class LivingHinge(BasePartObject):  # type: ignore[misc]
             )
         if use not in ("again", "few"):
             raise HingeError(f"use {use!r}: give 'again' or 'few'")
-        self.material, self.use = material.lower(), use
-        self.life = FLEX_LIVES[self.material]
+        self.printed_in, self.use = material.lower(), use
+        self.life = FLEX_LIVES[self.printed_in]
         bears = self.life.again if use == "again" else self.life.few
         at_least("web", "the web of a living hinge", self.web, 0.15, "print at least one layer")
         most = self.thickness / 3.0
@@ -162,7 +162,7 @@ class LivingHinge(BasePartObject):  # type: ignore[misc]
             raise HingeError(f"land is {self.land:g} mm: give a length above 0")
         at_most(
             "strain",
-            f"the strain of the web in {self.material}",
+            f"the strain of the web in {self.printed_in}",
             100.0 * self.strain,
             100.0 * bears + 1e-9,
             f"use a land of {needed:.2f} mm, a thinner web or another material",

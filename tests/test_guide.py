@@ -191,7 +191,7 @@ def test_turns_of_one_small_part_are_one_picture_of_cut_outs(kit: SimpleNamespac
     assert picture.image.shape == (226, 300, 3)
     assert len(picture.panels) == 3
     for panel in picture.panels:
-        assert panel.image.shape == (452, 600, 3)
+        assert panel.image.shape == (339, 450, 3)
     # Each cell shows what moves, and the fourth is empty.
     red = picture.image[..., 0].astype(int) > 1.6 * picture.image[..., 1].astype(int)
     assert red[:113, :150].sum() > 200

@@ -31,6 +31,8 @@ _PALE, _TINT = 0.42, 0.5
 ARROW_SHARES = (0.06, 0.94)
 #: The arrow's distance from the hinge, in voxel sides.
 _REACH = (0.75, 1.6)
+#: Cut-outs are taken from a picture so many times larger.
+_LARGER = 1.5
 #: Lines and letters are drawn this many times larger, and made smaller, so that they are smooth.
 _FINER = 3
 
@@ -177,7 +179,7 @@ def _draw_callout(
     count = len(step.phases)
     across = 1 if count == 2 else 2
     cell = (size[0] // across, size[1] // -(-count // across))
-    large = (2 * size[0], 2 * size[1])
+    large = (round(_LARGER * size[0]), round(_LARGER * size[1]))
     sheet = PillowImage.new("RGB", size, (255, 255, 255))
     draw = ImageDraw.Draw(sheet)
     font = ImageFont.truetype(str(font_file(bold=True)), round(size[1] / 20))
