@@ -7,6 +7,8 @@ Whoever changes a kit copies its folder. Imports stand inside the fixtures, sinc
 from __future__ import annotations
 
 import fcntl
+import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,16 @@ if TYPE_CHECKING:
 
 #: Length and thickness of the bar, in its own units: eight chunky voxels in a row.
 BAR = (80.0, 9.6, 9.6)
+
+
+@pytest.fixture(autouse=True)
+def _own_environment() -> Iterator[None]:
+    """What a test, or the command line that it calls, sets in the environment ends with it."""
+    before = dict(os.environ)
+    yield
+    if dict(os.environ) != before:
+        os.environ.clear()
+        os.environ.update(before)
 
 
 @pytest.fixture(scope="session")

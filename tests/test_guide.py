@@ -20,7 +20,7 @@ from fabfold.export.camera import View, direction_frame, project
 from fabfold.guide.fold_steps import gathered, turned
 from fabfold.guide.manual import STEP_PIXELS, plan_steps
 from fabfold.guide.step_drawing import MOVING, STAYING, draw_step
-from fabfold.guide.step_views import _blocks, visible_share
+from fabfold.guide.step_views import _blocks, _planned, visible_share
 from fabfold.guide.wording import step_text
 from fabfold.joinery.body_poses import poses_in_mm
 
@@ -198,6 +198,24 @@ def test_turns_of_one_small_part_are_one_picture_of_cut_outs(kit: SimpleNamespac
     assert red[:113, 150:].sum() > 200
     assert red[113:, :150].sum() > 200
     assert (picture.image[120:, 160:] == 255).all()
+
+
+def test_the_whole_is_turned_where_that_pays_for_what_follows() -> None:
+    seen = np.ones((4, 3))
+    # A little better elsewhere, step by step: it stays as it lies.
+    scores = np.array([[1.0, 1.2, 1.0], [1.0, 1.0, 1.2], [1.0, 1.2, 1.0], [1.0, 1.0, 1.2]])
+    assert _planned(scores, seen, 0) == [0, 0, 0, 0]
+    # Twice as good from the second step on, three times over: one turn, before the second step.
+    scores = np.array([[1.0, 0.5, 1.0], [1.0, 2.0, 1.0], [1.0, 2.0, 1.0], [1.0, 2.0, 1.0]])
+    assert _planned(scores, seen, 0) == [0, 1, 1, 1]
+    # A hidden part asks for a turn whatever it costs; the next step stays there.
+    scores = np.ones((4, 3))
+    seen[2, 0] = seen[2, 1] = 0.1
+    assert _planned(scores, seen, 0) == [2, 2, 2, 2]
+    # What is hidden from everywhere asks for none.
+    seen[2] = 0.1
+    assert _planned(scores, seen, 1) == [1, 1, 1, 1]
+    assert _planned(np.zeros((0, 3)), np.zeros((0, 3)), 0) == []
 
 
 def words_of(pdf: Path) -> list[list[tuple[float, ...]]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,10 @@ _PIXELS = (112, 84)
 #: Directions that are tried: degrees about z, and above the horizon.
 _AZIMUTHS = tuple(range(-60, 300, 45))
 _HEIGHTS = (24, 48, -24)
-#: A reader turns the object where another view is this much better.
-_WORTH_TURNING = 1.5
+#: A reader turns the object where what follows is so many times better seen, all steps together.
+_WORTH_TURNING = 3.0
+#: What a hidden part costs, as a logarithm: no turn is saved for it.
+_HIDDEN = 20.0
 #: Least share of what moves that must be seen in a view that is kept.
 LEAST_SEEN = 0.3
 #: Seen from below counts less: nobody likes to look there.
@@ -180,17 +183,57 @@ def step_views(joinery: Joinery, tree: FoldTree, steps: Sequence[FoldStep]) -> l
         One more than there are steps.
     """
     blocks = _blocks(joinery, tree)
-    views: list[StepView] = []
-    now = (FIRST_VIEW.azimuth_deg, FIRST_VIEW.elevation_deg)
-    for step in steps:
-        found = {}
-        for direction in _directions():
-            scores = [_score(blocks, phase, direction) for phase in step.phases]
-            found[direction] = (min(s for s, _ in scores), min(seen for _, seen in scores))
-        best = max(found, key=lambda direction: found[direction][0])
-        score, seen = found[now]
-        turn = score * _WORTH_TURNING < found[best][0] or seen < LEAST_SEEN < found[best][1]
-        now = best if turn else now
-        views.append(StepView(*now, turned=turn, seen=found[now][1]))
-    last = StepView(now[0], abs(now[1]), turned=now[1] < 0)
-    return [*views, last]
+    directions = list(_directions())
+    scores, seen = np.zeros((2, len(steps), len(directions)))
+    for row, step in enumerate(steps):
+        for column, direction in enumerate(directions):
+            found = [_score(blocks, phase, direction) for phase in step.phases]
+            scores[row, column] = min(score for score, _ in found)
+            seen[row, column] = min(share for _, share in found)
+    first = directions.index((FIRST_VIEW.azimuth_deg, FIRST_VIEW.elevation_deg))
+    chosen = _planned(scores, seen, first)
+    views = []
+    for row, (before, now) in enumerate(pairwise([first, *chosen])):
+        views.append(StepView(*directions[now], now != before, float(seen[row, now])))
+    azimuth, height = directions[chosen[-1] if chosen else first]
+    return [*views, StepView(azimuth, abs(height), turned=height < 0)]
+
+
+def _planned(scores: NDArray[np.float64], seen: NDArray[np.float64], first: int) -> list[int]:
+    """Direction of each step: all of them well seen, with few turns of the whole.
+
+    The best sequence by dynamic programming: a turn is worth it where it makes what follows, all
+    steps until the next turn together, so many times better seen. A direction in which a part
+    hides counts where no other shows it either.
+
+    Parameters
+    ----------
+    scores, seen : (s, d) float64 arrays
+        How well each step is seen from each direction, and how much of what moves.
+    first : int
+        Direction in which the whole lies before the first step.
+
+    Returns
+    -------
+    list of s int
+        Directions.
+    """
+    if not len(scores):
+        return []
+    gain = np.log(np.maximum(scores, 1e-9))
+    hidden = (seen < LEAST_SEEN) & (seen.max(axis=1, keepdims=True) >= LEAST_SEEN)
+    gain[hidden] -= _HIDDEN
+    turn = np.log(_WORTH_TURNING)
+    best = np.where(np.arange(scores.shape[1]) == first, 0.0, -turn) + gain[0]
+    came: list[NDArray[np.int64]] = []
+    for row in gain[1:]:
+        top = int(best.argmax())
+        stays = best >= best[top] - turn
+        came.append(np.where(stays, np.arange(len(best)), top))
+        best = np.maximum(best, best[top] - turn) + row
+    at = int(best.argmax())
+    path = [at]
+    for step in reversed(came):
+        at = int(step[at])
+        path.append(at)
+    return path[::-1]
