@@ -180,6 +180,35 @@ def test_a_model_gets_a_folder_of_its_name(bar):
         serve("nothing.stl")
 
 
+def test_a_search_that_is_stopped_leaves_its_best(kit):
+    with studio(kit) as opened:
+        worked(opened)
+        page = opened.page
+        opened.steps.change("another seed", seed=5)
+        page._refresh()
+        shown = []
+        better = page._show_better
+
+        def first_one(found):
+            better(found)
+            shown.append(found[1])
+            page.tasks.stop()
+
+        page._show_better = first_one
+        page.tasks.start("Search", page.search)
+        worked(opened)
+        assert page.tasks._line.content == "Search: done."
+        assert len(shown) >= 1
+        best = min(candidate.energy["total"] for candidate in shown)
+        tree = opened.steps.kit().fold().tree
+        assert tree.energy["total"] <= best + 1e-9
+        assert page.fold.motion is not None
+        # It goes on from there: bodies are made of that tree.
+        page.tasks.start("Bodies", page._build_only)
+        worked(opened)
+        assert page.fold.motion.certificate["min_gap_mm"] > 0.4
+
+
 def test_forces_of_a_session_are_kept_and_undone(kit):
     steps = StudioSteps(set_up_project(str(kit), None, {}))
     before = steps.kit().fold().motion

@@ -18,13 +18,15 @@ __all__ = [
     "PinVoxel",
     "Push",
     "Release",
+    "ShapeName",
     "Unfold",
     "Wait",
     "actions_json",
     "read_actions",
 ]
 
-Shape = Literal["A", "B"]
+#: One of the two copies, by the shape that it begins in.
+ShapeName = Literal["A", "B"]
 Steps = Annotated[int, Field(ge=1, le=100_000, description="time steps of 0.01 s")]
 Voxel = Annotated[int, Field(ge=0, description="number of a voxel, as in tree.json")]
 
@@ -60,7 +62,7 @@ class Push(_Action):
     """Push a voxel from now on, with a force in the frame of the body that is held; 0 ends it."""
 
     do: Literal["push"] = "push"
-    shape: Shape
+    shape: ShapeName
     voxel: Voxel
     force: tuple[float, float, float]
 
@@ -69,7 +71,7 @@ class PinVoxel(_Action):
     """Hold a voxel's body where it is from now on."""
 
     do: Literal["pin"] = "pin"
-    shape: Shape
+    shape: ShapeName
     voxel: Voxel
 
 
@@ -77,7 +79,7 @@ class Release(_Action):
     """Take all pushes and pins off a shape."""
 
     do: Literal["release"] = "release"
-    shape: Shape
+    shape: ShapeName
 
 
 class Carve(_Action):

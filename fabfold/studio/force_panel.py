@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fabfold.errors import NoFoldError
-from fabfold.physics.actions import Action, Carve, Match, PinVoxel, Push, Release, Unfold, Wait
+from fabfold.physics.actions import (
+    Action,
+    Carve,
+    Match,
+    PinVoxel,
+    Push,
+    Release,
+    ShapeName,
+    Unfold,
+    Wait,
+)
 from fabfold.physics.lattice_path import lattice_path
 from fabfold.physics.unfolding import Unfolding
 from fabfold.studio.kit_scene import KitScene, cube_meshes
@@ -50,7 +60,7 @@ class ForcePanel:
     ) -> None:
         self._tasks, self._tree, self._use = tasks, tree, use
         self._unfolding: Unfolding | None = None
-        self._chosen: tuple[str, int] | None = None
+        self._chosen: tuple[ShapeName, int] | None = None
         self._drag: Push | None = None  # as the hand has it now
         self._pulled: Push | None = None  # as the simulation has it
         gui: Any = server.gui
@@ -70,7 +80,10 @@ class ForcePanel:
         )
         gui.add_button("Undo").on_click(lambda _: tasks.start("Undo", self._undo))
         gui.add_button("Use this path").on_click(lambda _: tasks.start("Path", self._take))
-        self._scenes = {shape: KitScene(server, f"/forces-{shape}") for shape in ("A", "B")}
+        self._scenes: dict[ShapeName, KitScene] = {
+            "A": KitScene(server, "/forces-A"),
+            "B": KitScene(server, "/forces-B"),
+        }
         for shape, scene in self._scenes.items():
             scene.on_body = self._clicked(shape)
             scene.on_drag = self._dragged(shape)
@@ -131,7 +144,7 @@ class ForcePanel:
             unfolding.do(drag)
         self._pulled = drag
 
-    def _dragged(self, shape: str) -> Callable[[int, Any, Any, bool], None]:
+    def _dragged(self, shape: ShapeName) -> Callable[[int, Any, Any, bool], None]:
         def dragged(body: int, start: Any, end: Any, over: bool) -> None:
             scene = self._scenes[shape]
             voxel = scene.nearest_voxel(body, start)
@@ -144,7 +157,7 @@ class ForcePanel:
             force *= min(1.0, _MOST_PULL / max(float(np.linalg.norm(force)), 1e-9))
             x, y, z = (round(float(value), 3) for value in force)
             first = self._drag is None
-            self._drag = Push(shape=shape, voxel=voxel, force=(x, y, z))  # type: ignore[arg-type]
+            self._drag = Push(shape=shape, voxel=voxel, force=(x, y, z))
             if first and not self._tasks.busy:
                 self._tasks.start("Pulling", self._pull)
 
@@ -168,8 +181,8 @@ class ForcePanel:
         shape, voxel = self._chosen
         x, y, z = (float(value) for value in self._force_vector.value)
         actions: dict[str, Any] = {
-            "push": Push(shape=shape, voxel=voxel, force=(x, y, z)),  # type: ignore[arg-type]
-            "pin": PinVoxel(shape=shape, voxel=voxel),  # type: ignore[arg-type]
+            "push": Push(shape=shape, voxel=voxel, force=(x, y, z)),
+            "pin": PinVoxel(shape=shape, voxel=voxel),
             "carve": Carve(voxel=voxel),
         }
         self._act([actions[what]])
@@ -208,7 +221,7 @@ class ForcePanel:
             raise NoFoldError("press Begin first")
         return self._unfolding
 
-    def _clicked(self, shape: str) -> Callable[[int, Any, Any], None]:
+    def _clicked(self, shape: ShapeName) -> Callable[[int, Any, Any], None]:
         def clicked(body: int, start: Any, along: Any) -> None:
             scene = self._scenes[shape]
             voxel = scene.voxel_at(body, start, along)
@@ -220,7 +233,7 @@ class ForcePanel:
 
         return clicked
 
-    def choose(self, shape: str, voxel: int) -> None:
+    def choose(self, shape: ShapeName, voxel: int) -> None:
         """Choose a voxel, as a click on it does."""
         self._chosen = (shape, voxel)
 

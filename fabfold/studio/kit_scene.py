@@ -43,7 +43,7 @@ def cube_meshes(tree: FoldTree) -> list[Mesh]:
         One a body.
     """
     meshes = []
-    for index, body in enumerate(tree.bodies):
+    for body in tree.bodies:
         parts = [(tree.source[v].astype(float), np.full(3, _CUBE)) for v in body.voxels]
         if not parts:
             edge = tree.edges[-1 if body.edge is None else body.edge]
@@ -57,7 +57,6 @@ def cube_meshes(tree: FoldTree) -> list[Mesh]:
             faces.append(triangles + 8 * len(corners))
             corners.append(box)
         meshes.append((np.concatenate(corners), np.concatenate(faces).astype(np.int32)))
-        assert len(meshes) == index + 1
     return meshes
 
 
@@ -130,7 +129,7 @@ class KitScene:
         self._tree = tree
         self._picked = frozenset()
         self._middle = np.asarray(tree.source.mean(axis=0))
-        self._colours = [tuple(int(c) for c in row) for row in body_colours(tree)]  # type: ignore[misc]
+        self._colours = [(int(r), int(g), int(b)) for r, g, b in body_colours(tree)]
         for index, (vertices, faces) in enumerate(meshes):
             handle = self._server.scene.add_mesh_simple(
                 f"{self._name}/{tree.bodies[index].name}",

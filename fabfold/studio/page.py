@@ -18,7 +18,7 @@ from fabfold.studio.fold_panel import FoldPanel
 from fabfold.studio.force_panel import ForcePanel
 from fabfold.studio.grid_panel import GridPanel, ModelView
 from fabfold.studio.kit_scene import KitScene, cube_meshes, joinery_meshes
-from fabfold.studio.page_tasks import PageTasks, escaped, table
+from fabfold.studio.page_tasks import PageTasks, StoppedError, escaped, table
 from fabfold.studio.size_panel import SizePanel
 from fabfold.studio.steps import StudioSteps
 from fabfold.studio.wish_panel import WishPanel
@@ -245,7 +245,14 @@ class StudioPage:
         kit = self._kit()
         kit.on_better = self._show_better
         self.set_view("Kit")
-        kit.run("fold")
+        try:
+            kit.run("fold")
+        except StoppedError:
+            # The best so far counts, where there is any.
+            self.tasks.go_on()
+            kit = self._steps.kit(found=True)
+            kit.listener = self.tasks
+            kit.run("fold")
         self.forces.close()
         self._show_planned()
 

@@ -18,7 +18,7 @@ from fabfold.progress import Progress
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["PageTasks"]
+__all__ = ["PageTasks", "StoppedError", "escaped", "table"]
 
 _TITLES = {
     "solid": "Reading the model",
@@ -61,6 +61,10 @@ class PageTasks:
     def start(self, title: str, work: Callable[[], None]) -> None:
         """Put work at the end of the queue."""
         self._queue.put((title, work))
+
+    def go_on(self) -> None:
+        """Let what is left of stopped work be done: to keep what it has found."""
+        self._stop.clear()
 
     def stop(self) -> None:
         """Stop the work that is going on at its next word of progress."""

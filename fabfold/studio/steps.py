@@ -15,7 +15,7 @@ from fabfold.recipe.recipe import Recipe, make_recipe
 from fabfold.recipe.start import ProjectSetup
 from fabfold.recipe.targets import find_input, named_actions
 
-__all__ = ["Step", "StudioSteps"]
+__all__ = ["Step", "StudioSteps", "with_folder"]
 
 _FORMAT = "fabfold-studio"
 #: Steps that are kept.
@@ -126,8 +126,13 @@ class StudioSteps:
         self._write()
         return True
 
-    def kit(self) -> Kit:
+    def kit(self, *, found: bool = False) -> Kit:
         """The kit of the recipe that counts now; what was made of it is kept in memory.
+
+        Parameters
+        ----------
+        found : bool
+            Begin anew with the best of what an ended search has left, and search no further.
 
         Raises
         ------
@@ -136,15 +141,16 @@ class StudioSteps:
         """
         recipe, start = self.recipe, self._start
         known = recipe.model_dump_json()
-        if known not in self._kits:
+        if found or known not in self._kits:
             actions = None
             if recipe.actions:
                 actions = find_input(recipe.actions, recipe.actions_sha256, self.folder, "actions")
             template = start.template if recipe.template == start.recipe.template else None
             self._kits.clear()  # Bodies of one kit fill enough memory.
             self._kits[known] = Kit(
-                recipe, model=start.model, template=template, actions=actions, folder=self.folder
-            )
+                recipe, model=start.model, template=template, actions=actions, folder=self.folder,
+                seconds=0.0 if found else None,
+            )  # fmt: skip
         return self._kits[known]
 
     # How they are kept --------------------------------------------------------------------------
