@@ -59,6 +59,7 @@ def test_files_in_the_working_folder_are_not_executed(bar, bar_options, tmp_path
     assert not (tmp_path / "TRAPPED").exists()
 
 
+@pytest.mark.slow
 def test_a_refused_model_changes_nothing(bar, bar_options, tmp_path):
     kit = tmp_path / "kit"
     open_kit(str(bar), folder=kit, **bar_options).run("voxelize")
@@ -93,6 +94,7 @@ def test_what_cannot_be_printed_is_refused_before_the_search(bar, bar_options, o
         open_kit(str(bar), **{**bar_options, **options}).voxelize()
 
 
+@pytest.mark.slow
 def test_a_kit_of_another_name_leaves_nothing_behind(bar_kit, bar, bar_options, tmp_path):
     kit = tmp_path / "kit"
     bar_kit.export(kit)
@@ -111,6 +113,7 @@ def test_a_kit_of_another_name_leaves_nothing_behind(bar_kit, bar, bar_options, 
     assert mine.read_text() == "not a file of fabfold"
 
 
+@pytest.mark.slow
 def test_exporting_again_gives_the_same_bytes(bar_kit, tmp_path):
     bar_kit.export(tmp_path / "kit")
     once = contents(tmp_path / "kit")
@@ -119,6 +122,7 @@ def test_exporting_again_gives_the_same_bytes(bar_kit, tmp_path):
     assert contents(tmp_path / "twice") == once
 
 
+@pytest.mark.slow
 def test_errors_of_the_file_system_are_one_sentence(bar, tmp_path):
     (tmp_path / "file").write_text("")
     for arguments in (
@@ -173,6 +177,7 @@ def test_a_system_message_says_where_what_and_what_to_do():
     assert system_message(OSError("odd")) == "odd"
 
 
+@pytest.mark.slow
 def test_a_damaged_journal_is_told(bar, bar_options, tmp_path):
     kit = tmp_path / "kit"
     open_kit(str(bar), folder=kit, **bar_options).run("voxelize")

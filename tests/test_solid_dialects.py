@@ -184,6 +184,7 @@ def test_ply_strips(tmp_path: Path) -> None:
     assert volume(load_solid(path)) == pytest.approx(1 / 6)
 
 
+@pytest.mark.slow
 def test_a_step_file_may_begin_with_comments(tmp_path: Path) -> None:
     import build123d as bd
 

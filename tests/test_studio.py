@@ -180,6 +180,7 @@ def test_a_model_gets_a_folder_of_its_name(bar):
         serve("nothing.stl")
 
 
+@pytest.mark.slow
 def test_a_search_that_is_stopped_leaves_its_best(kit):
     with studio(kit) as opened:
         worked(opened)
@@ -339,6 +340,7 @@ def worked(opened):
     opened.page.tasks.run()
 
 
+@pytest.mark.slow
 def test_a_kit_opens_with_its_bodies_and_goes_on(kit):
     with studio(kit) as opened:
         worked(opened)

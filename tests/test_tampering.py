@@ -88,6 +88,7 @@ CHANGES: tuple[Change, ...] = (
 )
 
 
+@pytest.mark.slow
 def test_a_sound_kit_has_no_fault(bar_kit: Kit) -> None:
     assert bar_kit.folder is not None
     kit = read_kit(bar_kit.folder)
@@ -135,6 +136,7 @@ def test_every_change_of_a_hundred_is_found(bar_kit: Kit, tmp_path: Path, change
     assert opened.delivered()[0].ok
 
 
+@pytest.mark.slow
 def test_the_command_finds_changes_and_leaves_them(bar_kit: Kit, tmp_path: Path) -> None:
     assert bar_kit.folder is not None
     kit = tmp_path / "kit"

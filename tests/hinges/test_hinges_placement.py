@@ -238,6 +238,7 @@ def test_a_name_that_a_body_has_given_is_refused() -> None:
         SingleHinge(20, clearance=0.3).fit(child, third)
 
 
+@pytest.mark.slow
 def test_a_chain_of_doubles_folds_by_its_joints() -> None:
     """Five double hinges between six boxes in a row; all fold by joints alone."""
     size, gap = 20.0, 0.3
