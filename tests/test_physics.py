@@ -182,6 +182,23 @@ def test_undo_takes_back_each_action():
     assert not unfolding.undo()
 
 
+def test_what_follows_an_undo_is_what_its_actions_do():
+    """To the last bit: the actions that are kept find the same path again."""
+    one = Unfolding(strip())
+    one.do(Unfold(steps=302))  # Not a whole number of records.
+    one.do(Unfold(steps=101))
+    one.do(Carve(voxel=3))
+    one.undo()
+    one.undo()
+    one.do(Match(steps=250))
+    one.do(Match(steps=253), joined=True)
+    other = Unfolding(strip())
+    for action in one.actions:
+        other.do(action)
+    for shape in "AB":
+        assert np.array_equal(one.way_deg(shape), other.way_deg(shape))
+
+
 def test_steps_are_counted_where_a_hinge_passes_the_middle():
     way = np.array([[0.0, 0], [50, 0], [40, -46], [95, -100], [140, -130], [170, -136]])
     assert steps_of(way, detours=True) == [

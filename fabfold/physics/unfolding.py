@@ -9,7 +9,7 @@ actions give the same motion.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import RecipeError
 from fabfold.fold.core_sweep import CORE_HALF_SIDE
-from fabfold.physics.actions import Action, Carve, Match, PinVoxel, Push, Release, Unfold, Wait
+from fabfold.physics.actions import Action, Match, PinVoxel, Push, Release, Unfold, Wait
 from fabfold.physics.rig import Box, rig_model
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import WHOLE, unpacked
@@ -104,13 +104,25 @@ class _Copy:
 
 
 @dataclass(frozen=True)
+class _State:
+    """All that the motion of a copy goes on from."""
+
+    position: F64  # of all hinges, radians
+    speed: F64
+    place: F64
+    pushes: dict[int, F64]
+    pins: dict[int, F64]
+
+
+@dataclass(frozen=True)
 class _Snapshot:
     """All that an action may change."""
 
-    states: dict[str, tuple[F64, F64, F64, dict[int, F64], dict[int, F64]]]
+    states: dict[str, _State]
     carved: frozenset[int]
     records: int
     actions: int
+    steps: int
 
 
 class Unfolding:
@@ -138,7 +150,7 @@ class Unfolding:
         self._snapshots: list[_Snapshot] = []
         self._load()
         self._copies = {
-            shape: self._copy(angles)
+            shape: self._copy(np.radians(angles), np.zeros(len(tree.hinges)))
             for shape, angles in (("A", np.zeros(len(tree.hinges))), ("B", tree.fold_angles))
         }
         self._record()
@@ -187,21 +199,13 @@ class Unfolding:
 
     # What can be done -----------------------------------------------------------------------
 
-    def do(
-        self,
-        action: Action,
-        watch: Callable[[int, int], None] | None = None,
-        *,
-        joined: bool = False,
-    ) -> None:
+    def do(self, action: Action, *, joined: bool = False) -> None:
         """Do one action, and record it.
 
         Parameters
         ----------
         action : Action
             What to do.
-        watch : callable, optional
-            Hears of each hundredth time step: how many are done, and of how many.
         joined : bool
             Record more steps of the same force as one action with those before.
 
@@ -219,13 +223,15 @@ class Unfolding:
         if isinstance(action, Unfold | Match | Wait) and last is not None and last.do == action.do:
             self.actions[-1] = action.model_copy(update={"steps": last.steps + action.steps})
         else:
-            self._snapshots.append(self._snapshot())
+            before = self._snapshot()
+            # An action goes on from what a snapshot holds and from nothing else, so that what is
+            # done after an undo is what its list of actions does.
+            self._restore(before.states)
+            self._snapshots.append(before)
             self.actions.append(action)
         if isinstance(action, Unfold | Match | Wait):
-            for step in range(action.steps):
+            for _ in range(action.steps):
                 self._step(action)
-                if watch is not None and step % 100 == 99:
-                    watch(step + 1, action.steps)
         elif isinstance(action, Push):
             pushes = self._copies[action.shape].pushes
             pushes[action.voxel] = np.array(action.force)
@@ -240,7 +246,10 @@ class Unfolding:
             self._copies[action.shape].pushes.clear()
             self._copies[action.shape].pins.clear()
         else:
-            self._carve(action)
+            self.carved.add(action.voxel)
+            states = self._snapshot().states
+            self._load()
+            self._restore(states)
 
     def undo(self) -> bool:
         """Take back the last action; False where there is none."""
@@ -250,12 +259,10 @@ class Unfolding:
         if last.carved != self.carved:
             self.carved = set(last.carved)
             self._load()
-        for shape, (position, speed, place, pushes, pins) in last.states.items():
-            copy = self._copy(np.degrees(position))
-            copy.data.qvel[self._speed] = speed
-            copy.place, copy.pushes, copy.pins = place, dict(pushes), dict(pins)
-            self._copies[shape] = copy
-            del self._track[shape][last.records :]
+        self._restore(last.states)
+        self._steps = last.steps
+        for track in self._track.values():
+            del track[last.records :]
         del self.actions[last.actions :]
         return True
 
@@ -279,13 +286,21 @@ class Unfolding:
         for number, voxel in enumerate(voxels):
             self._voxel[model.geom(f"box-{number}").id] = voxel
 
-    def _copy(self, angles_deg: F64) -> _Copy:
+    def _copy(self, position: F64, speed: F64) -> _Copy:
         import mujoco
 
         data = mujoco.MjData(self._model)
-        data.qpos[self._joint] = np.radians(angles_deg)
+        data.qpos[self._joint], data.qvel[self._speed] = position, speed
         mujoco.mj_forward(self._model, data)
         return _Copy(data, self._places(data))
+
+    def _restore(self, states: dict[str, _State]) -> None:
+        """Let both copies go on from a state."""
+        for shape, state in states.items():
+            copy = self._copy(state.position, state.speed)
+            copy.place = state.place
+            copy.pushes, copy.pins = dict(state.pushes), dict(state.pins)
+            self._copies[shape] = copy
 
     def _places(self, data: mujoco.MjData) -> F64:
         """Centres of all voxels, (n, 3); frames of bodies are at shape A's origin."""
@@ -322,25 +337,13 @@ class Unfolding:
         if self._steps % _EVERY == 0:
             self._record()
 
-    def _carve(self, action: Carve) -> None:
-        self.carved.add(action.voxel)
-        before = self._copies
-        positions = {shape: copy.data.qpos[self._joint].copy() for shape, copy in before.items()}
-        speeds = {shape: copy.data.qvel[self._speed].copy() for shape, copy in before.items()}
-        self._load()
-        for shape, copy in before.items():
-            fresh = self._copy(np.degrees(positions[shape]))
-            fresh.data.qvel[self._speed] = speeds[shape]
-            fresh.place, fresh.pushes, fresh.pins = copy.place, copy.pushes, copy.pins
-            self._copies[shape] = fresh
-
     def _record(self) -> None:
         for shape, copy in self._copies.items():
             self._track[shape].append(copy.data.qpos[self._joint].copy())
 
     def _snapshot(self) -> _Snapshot:
         states = {
-            shape: (
+            shape: _State(
                 copy.data.qpos[self._joint].copy(),
                 copy.data.qvel[self._speed].copy(),
                 copy.place.copy(),
@@ -349,4 +352,5 @@ class Unfolding:
             )
             for shape, copy in self._copies.items()
         }
-        return _Snapshot(states, frozenset(self.carved), len(self._track["A"]), len(self.actions))
+        records, actions = len(self._track["A"]), len(self.actions)
+        return _Snapshot(states, frozenset(self.carved), records, actions, self._steps)
