@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.fold.motion import Motion
-from fabfold.joinery.barrel_sweeps import descendants
+from fabfold.joinery.barrel_sweeps import lighter_sides
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.lattice.rotations import rotation_about
@@ -194,7 +194,7 @@ def fold_steps(
     poses = whole @ poses_in_mm(tree, joinery, motion.angles_deg[0])
     angles = motion.angles_deg[0].copy()
     origin = np.asarray(joinery.origin_mm, dtype=float)
-    carries = descendants(tree)
+    sides = lighter_sides(tree, volume)
     steps: list[FoldStep] = []
     for row, columns in enumerate(motion.moves):
         for column in columns:
@@ -206,10 +206,10 @@ def fold_steps(
             point = parent[:3, :3] @ (origin + joinery.voxel_mm * np.asarray(hinge.point))
             point = point + parent[:3, 3]
             axis = parent[:3, :3] @ np.asarray(hinge.direction, dtype=float)
-            carried, held, sign = carries[column], hinge.parent, np.sign(turn)
-            if volume[carried].sum() > volume[~carried].sum():
-                carried, held, sign = ~carried, hinge.child, -np.sign(turn)
-            moving = tuple(np.flatnonzero(carried).tolist())
+            held, sign = hinge.parent, np.sign(turn)
+            if sides[column, hinge.parent]:
+                held, sign = hinge.child, -sign
+            moving = tuple(np.flatnonzero(sides[column]).tolist())
             step = FoldStep(
                 *(len(steps) + 1, column, abs(turn), turn, moving, held),
                 *(point, sign * axis, poses, poses),

@@ -19,6 +19,7 @@ __all__ = [
     "barrel_sweeps",
     "descendants",
     "distinct_sweeps",
+    "lighter_sides",
     "resting_sweep",
     "turn_axis",
     "turning_sweep",
@@ -106,6 +107,26 @@ def descendants(tree: FoldTree) -> NDArray[np.bool_]:
             if tree.hinges[later].parent == child:
                 moves[index] |= moves[later]
     return moves
+
+
+def lighter_sides(tree: FoldTree, volume: Floats) -> NDArray[np.bool_]:
+    """Which bodies a person turns about each hinge: the side with less material.
+
+    Parameters
+    ----------
+    tree : FoldTree
+        The bodies and their hinges.
+    volume : (b,) float64 array
+        Of every body.
+
+    Returns
+    -------
+    (h, b) bool array
+        The bodies that a hinge carries, unless they are more than half of the material.
+    """
+    carried = descendants(tree)
+    heavy = carried @ volume > ~carried @ volume
+    return np.where(heavy[:, None], ~carried, carried)
 
 
 def barrel_sweeps(tree: FoldTree, motion: Motion, reach: float) -> list[Sweep]:

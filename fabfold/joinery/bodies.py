@@ -126,3 +126,8 @@ class Joinery:
     rounded_inside_mm3: float = 0.0
     face_gap_mm: float | None = None
     pins: tuple[PlacedPin, ...] = ()
+
+    @property
+    def gap_mm(self) -> float:
+        """Gap between the faces of two bodies, mm."""
+        return self.clearance_mm if self.face_gap_mm is None else self.face_gap_mm

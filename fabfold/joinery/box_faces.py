@@ -114,12 +114,11 @@ def meeting_sides(
     list of two (body, mouth, inward)
         Index of the body; the point on its face and the direction into it, in shape A.
     """
-    gap = joinery.clearance_mm if joinery.face_gap_mm is None else joinery.face_gap_mm
     sides = []
     for body, inward in zip(meeting.bodies, (-meeting.normal, meeting.normal), strict=True):
         pose = poses[body]
         into = pose[:3, :3].T @ inward
-        point = pose[:3, :3].T @ (place - pose[:3, 3]) + gap / 2 * into
+        point = pose[:3, :3].T @ (place - pose[:3, 3]) + joinery.gap_mm / 2 * into
         sides.append((body, point, into))
     return sides
 

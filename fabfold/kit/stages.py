@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from fabfold.errors import CheckError, GeometryError, NoFoldError
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
@@ -108,25 +110,27 @@ def build(
 
         progress.update(None, "places for magnets")
         joinery, retention = hold_shut(planned.tree, planned.motion, joinery, MAGNETS[mode.magnet])
+    tree, motion, meshes = planned.tree, planned.motion, meshes_with_pins(joinery)
     certificate = certify(
-        planned.tree,
-        planned.motion,
-        meshes_with_pins(joinery),
+        tree,
+        motion,
+        meshes,
         voxel_mm=joinery.voxel_mm,
         origin_mm=joinery.origin_mm,
         min_gap_mm=profile.min_gap_mm,
         progress=progress,
     )
     certificate["any_order"] = certify_orders(
-        planned.tree,
-        planned.motion,
-        meshes_with_pins(joinery),
+        tree,
+        motion,
+        meshes,
         voxel_mm=joinery.voxel_mm,
         origin_mm=joinery.origin_mm,
         min_gap_mm=profile.min_gap_mm,
         progress=progress,
+        volume=np.array([body.volume for body in joinery.bodies]),
     )
-    motion = replace(planned.motion, certificate=certificate)
+    motion = replace(motion, certificate=certificate)
     return BuiltTree(replace(planned, motion=motion), joinery, refused, apart, retention)
 
 

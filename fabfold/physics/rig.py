@@ -18,7 +18,7 @@ from fabfold.tree.fold_tree import FoldTree
 if TYPE_CHECKING:
     import mujoco
 
-__all__ = ["Box", "Motor", "rig_model"]
+__all__ = ["Box", "Motor", "hinge_joints", "rig_model"]
 
 F64 = NDArray[np.float64]
 
@@ -147,3 +147,15 @@ def rig_model(
             conaffinity=0,
         )
     return spec.compile()
+
+
+def hinge_joints(
+    model: mujoco.MjModel, tree: FoldTree
+) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Where the hinges of a rig are in ``qpos`` and in ``qvel``, (h,) each.
+
+    The compiler numbers bodies depth first, so places are asked for by name.
+    """
+    joints = [model.joint(hinge.name) for hinge in tree.hinges]
+    position = np.array([int(joint.qposadr[0]) for joint in joints], dtype=int)
+    return position, np.array([int(joint.dofadr[0]) for joint in joints], dtype=int)

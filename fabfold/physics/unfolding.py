@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fabfold.errors import RecipeError
 from fabfold.fold.core_sweep import CORE_HALF_SIDE
 from fabfold.physics.actions import Action, Match, PinVoxel, Push, Release, Unfold, Wait
-from fabfold.physics.rig import Box, rig_model
+from fabfold.physics.rig import Box, hinge_joints, rig_model
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import WHOLE, unpacked
 
@@ -276,10 +276,8 @@ class Unfolding:
             self.tree, boxes, time_step=_TIME_STEP, density=1.0, damping=_HINGE_DRAG,
             limits_deg=(np.minimum(end, 0.0), np.maximum(end, 0.0)),
         )  # fmt: skip
-        model, hinges = self._model, self.tree.hinges
-        # The compiler numbers bodies depth first: ask for places by name.
-        self._joint = np.array([int(model.joint(h.name).qposadr[0]) for h in hinges], dtype=int)
-        self._speed = np.array([int(model.joint(h.name).dofadr[0]) for h in hinges], dtype=int)
+        model = self._model
+        self._joint, self._speed = hinge_joints(model, self.tree)
         body = [model.body(self.tree.bodies[b].name).id for b in self.tree.voxel_body]
         self._body = np.array(body, dtype=int)
         self._voxel = np.full(model.ngeom, -1)

@@ -131,7 +131,7 @@ def box_play(
         The same for the same arguments.
     """
     if not tree.hinges:
-        return BoxPlay(0.0, _gap(joinery), 0.0, _gap(joinery), 0.0)
+        return BoxPlay(0.0, joinery.gap_mm, 0.0, joinery.gap_mm, 0.0)
     poses = poses_in_mm(tree, joinery, angles_deg)
     linkage = _PlayLinkage(tree, joinery, poses)
     meetings = face_meetings(tree, joinery, poses)
@@ -142,14 +142,14 @@ def box_play(
     outside = _outside(tree, joinery, poses, linkage)
     figures: list[float] = []
     pressed = 0.0
-    flush = gaps <= _gap(joinery) + 1e-9
+    flush = gaps <= joinery.gap_mm + 1e-9
     for held in (False, True):
         most = np.where(flush & held, 0.0, np.inf)
         drawn = _let_go(draws, parting, -gaps, most, limits)
         open_ = drawn @ parting.T
         off = np.maximum(-gaps - open_, open_ - most).max(axis=1)
         pressed = max(pressed, float(np.percentile(off, _SHARE)))
-        figures += _outer_figures(drawn, outside, _gap(joinery))
+        figures += _outer_figures(drawn, outside, joinery.gap_mm)
     wander, seam, held_wander, held_seam = figures
     return BoxPlay(wander, seam, held_wander, held_seam, round(max(pressed, 0.0), 3))
 
@@ -168,11 +168,6 @@ def _outer_figures(
     return [round(float(np.percentile(figure, _SHARE)), 3) for figure in figures]
 
 
-def _gap(joinery: Joinery) -> float:
-    """Gap between two faces that meet, mm."""
-    return joinery.clearance_mm if joinery.face_gap_mm is None else joinery.face_gap_mm
-
-
 def _limits(tree: FoldTree, joinery: Joinery, angles_deg: F64, pin: LoosePin | None) -> F64:
     """Largest size of each of the numbers of all hinges, (6 h,): mm and radians."""
     made: dict[float, Play] = {}
@@ -186,13 +181,13 @@ def _limits(tree: FoldTree, joinery: Joinery, angles_deg: F64, pin: LoosePin | N
                 knuckles=joinery.knuckles,
                 barrel_radius_mm=joinery.barrel_radius_mm,
                 pin_radius_mm=joinery.pin_radius_mm,
-                gap_mm=_gap(joinery),
+                gap_mm=joinery.gap_mm,
                 wall_mm=MIN_WALL_MM,
                 pin=pin,
             )
         one = made[angle]
         tilt = float(np.radians(one.tilt))
-        turn = _gap(joinery) / joinery.voxel_mm
+        turn = joinery.gap_mm / joinery.voxel_mm
         limits += [one.radial, one.radial, max(one.axial), tilt, tilt, turn]
     return np.array(limits)
 
@@ -237,7 +232,7 @@ def _parting(
                 point = meeting.middle + side * offset
                 motion = linkage.of(other, point) - linkage.of(one, point)
                 rows.append(meeting.normal @ motion)
-                gaps.append(_gap(joinery) + side * depth)
+                gaps.append(joinery.gap_mm + side * depth)
     return np.array(rows), np.array(gaps)
 
 

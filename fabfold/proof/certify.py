@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import CheckError
 from fabfold.fold.motion import Motion, end_pose_error
+from fabfold.joinery.barrel_sweeps import descendants, lighter_sides
 from fabfold.meshes import mesh_volume
 from fabfold.progress import Progress, SilentProgress
 from fabfold.proof.bvh import BoxTrees, new_box_trees, refit
@@ -29,15 +30,6 @@ __all__ = ["certify", "certify_orders"]
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 _START = "shape A"
-
-
-def _carried(tree: FoldTree, hinge: int) -> NDArray[np.bool_]:
-    """Bodies that a hinge carries, shape (b,) bool."""
-    inside = np.zeros(len(tree.bodies), dtype=bool)
-    inside[tree.hinges[hinge].child] = True
-    for later in tree.hinges:
-        inside[later.child] |= inside[later.parent]
-    return inside
 
 
 def _frame(point: F64, direction: F64) -> F64:
@@ -315,6 +307,7 @@ def certify_orders(
     min_gap_mm: float,
     progress: Progress | None = None,
     *,
+    volume: F64 | None = None,
     most: int = 3,
     slack_mm: float = 0.01,
 ) -> list[tuple[int, int]]:
@@ -329,6 +322,8 @@ def certify_orders(
         As for :func:`certify`, which the path has passed.
     progress : Progress, optional
         Hears of every group.
+    volume : (b,) float64 array, optional
+        Of every body, as it decides which side of a hinge is turned; that of the meshes by default.
     most : int
         Moves of a group at most.
 
@@ -340,7 +335,9 @@ def certify_orders(
     progress = progress or SilentProgress()
     bodies = _load(tree, meshes, voxel_mm, origin_mm)
     hinges = [int(moving[0]) for moving in motion.moves[1:]]
-    parts = [_smaller_side(tree, meshes, hinge) for hinge in hinges]
+    if volume is None:
+        volume = np.array([mesh_volume(vertices, faces) for vertices, faces in meshes])
+    parts = lighter_sides(tree, volume)[hinges]
     groups: list[tuple[int, int]] = []
     first = 0
     while first < len(hinges):
@@ -357,15 +354,6 @@ def certify_orders(
             groups.append((first + 1, last + 1))
         first = last + 1
     return groups
-
-
-def _smaller_side(
-    tree: FoldTree, meshes: Sequence[tuple[F64, I32]], hinge: int
-) -> NDArray[np.bool_]:
-    """Bodies on the side of a hinge with less material, shape (b,) bool."""
-    carried = _carried(tree, hinge)
-    volume = np.array([mesh_volume(vertices, faces) for vertices, faces in meshes])
-    return carried if volume[carried].sum() <= volume[~carried].sum() else ~carried
 
 
 def _in_any_order(
@@ -413,7 +401,7 @@ def _move(
     direction = parent[:3, :3] @ np.array(axis.direction, dtype=float)
     frame = _frame(point * bodies.voxel_mm + bodies.origin_mm, direction)
     bodies.place(frame @ bodies.in_mm(poses))
-    inside = _carried(tree, hinge)
+    inside = descendants(tree)[hinge]
     turning = np.flatnonzero(inside).astype(np.int32)
     resting = np.flatnonzero(~inside).astype(np.int32)
     pair = np.zeros(2, dtype=np.int32)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.magnets import MAGNETS, Retention
-from fabfold.physics.rig import Box, Motor, rig_model
+from fabfold.physics.rig import Box, Motor, hinge_joints, rig_model
 from fabfold.progress import Progress, SilentProgress
 from fabfold.proof.replay import course, material_boxes, require_finite
 from fabfold.tree.fold_tree import FoldTree
@@ -181,7 +181,7 @@ class _Scene:
         )  # fmt: skip
         data = mujoco.MjData(model)
         motor = np.array([model.actuator(h.name).id for h in tree.hinges], dtype=int)
-        dof = np.array([int(model.joint(h.name).dofadr[0]) for h in tree.hinges], dtype=int)
+        _, dof = hinge_joints(model, tree)
         # kg · side² / s² to N mm: a newton is kg · m / s².
         unit = self._side**2 / 1000.0
         turned, held = np.zeros(len(tree.hinges)), np.zeros(len(tree.hinges))
@@ -213,7 +213,7 @@ class _Scene:
             gravity=self._gravity(up), friction=self._friction,
         )  # fmt: skip
         data = mujoco.MjData(model)
-        joint = np.array([int(model.joint(h.name).qposadr[0]) for h in tree.hinges], dtype=int)
+        joint, _ = hinge_joints(model, tree)
         data.qpos[joint] = np.radians(angles_deg)
         mujoco.mj_forward(model, data)
         pulls = [] if retention is None else self._pulls(model, joinery, retention)

@@ -20,7 +20,7 @@ from fabfold.errors import CheckError
 from fabfold.fold.clashes import clashes_on
 from fabfold.fold.core_sweep import CORE_HALF_SIDE
 from fabfold.fold.motion import Motion, end_pose_error, quarter_path
-from fabfold.physics.rig import Box, Motor, rig_model
+from fabfold.physics.rig import Box, Motor, hinge_joints, rig_model
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import WHOLE, unpacked
@@ -269,8 +269,7 @@ def replay(
         motor=Motor(_GAIN, _BRAKE),
     )  # fmt: skip
     data = mujoco.MjData(model)
-    # The compiler numbers bodies depth first: ask for places by name.
-    joint = np.array([int(model.joint(h.name).qposadr[0]) for h in tree.hinges], dtype=int)
+    joint, _ = hinge_joints(model, tree)
     motor = np.array([model.actuator(h.name).id for h in tree.hinges], dtype=int)
 
     worst = lag = 0.0
