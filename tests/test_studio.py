@@ -13,6 +13,7 @@ import trimesh
 
 from fabfold.errors import ModelError, NoFoldError, RecipeError
 from fabfold.joinery.sizes import hinge_size
+from fabfold.kit.figure_pictures import bodies_named
 from fabfold.kit.kit import open_kit
 from fabfold.lattice.rotations import rotation_of_degrees
 from fabfold.physics.actions import Match, Unfold, Wait
@@ -22,7 +23,6 @@ from fabfold.studio.fold_panel import angles_at
 from fabfold.studio.gate import Gate, quiet_stop, start_server
 from fabfold.studio.grid_panel import ModelView, grid_fill
 from fabfold.studio.kit_scene import KitScene, cube_meshes
-from fabfold.studio.page import bodies_named
 from fabfold.studio.page_tasks import escaped
 from fabfold.studio.serve import serve
 from fabfold.studio.size_panel import hinge_outlook
@@ -208,6 +208,14 @@ def test_a_search_that_is_stopped_leaves_its_best(kit):
         page.tasks.start("Bodies", page._build_only)
         worked(opened)
         assert page.fold.motion.certificate["min_gap_mm"] > 0.4
+        # Pressed again, it searches on from what was found: to the end this time.
+        assert opened.steps.kit().seconds == 0.0
+        page._show_better = better
+        page.tasks.start("Search", page.search)
+        worked(opened)
+        assert page.tasks._line.content == "Search: done."
+        assert opened.steps.kit().seconds is None
+        assert opened.steps.kit().fold().tree.energy["total"] <= tree.energy["total"] + 1e-9
 
 
 def test_forces_of_a_session_are_kept_and_undone(kit):

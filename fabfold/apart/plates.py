@@ -18,7 +18,7 @@ from fabfold.meshes import vector_areas
 from fabfold.printing.profiles import Profile
 from fabfold.printing.standing import centre_of_mass, stands_over
 
-__all__ = ["LaidBody", "Plates", "lay_out", "lay_out_plates", "on_plate"]
+__all__ = ["RIM_MM", "LaidBody", "Plates", "lay_out", "lay_out_plates", "on_plate"]
 
 Floats = NDArray[np.float64]
 
@@ -28,8 +28,9 @@ CONTACT_MM2 = 60.0
 _FLAT_MM = 0.05
 #: A barrel stands at most this share of a voxel below a body's flat face.
 _BARREL_SHARE = 0.2
-#: Room between two bodies, and along the rim of the plate, mm.
-_ROOM_MM, _RIM_MM = 4.0, 5.0
+#: Room along the rim of the plate, and between two bodies, mm.
+RIM_MM = 5.0
+_ROOM_MM = 4.0
 _QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -236,7 +237,7 @@ def lay_out_plates(joinery: Joinery, bores: Sequence[PinBore], profile: Profile)
         lay_out(index, joinery, bores, profile.max_overhang_deg)
         for index in range(len(joinery.bodies))
     ]
-    free = np.array([bed[0] - 2 * _RIM_MM, bed[1] - 2 * _RIM_MM, bed[2]])
+    free = np.array([bed[0] - 2 * RIM_MM, bed[1] - 2 * RIM_MM, bed[2]])
     for entry in laid:
         _require_fit(joinery, entry, free, bed)
     packer = newPacker(mode=PackingMode.Offline, pack_algo=MaxRectsBl, rotation=True)

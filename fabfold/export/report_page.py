@@ -116,9 +116,7 @@ def _answers(data: Mapping[str, Any]) -> str:
         cards.append(_answer("How closed is the box?", f"{closed:.0%}", text))
     play = next((check for check in checks if check["name"] == _PLAY), None)
     if play is not None:
-        text = (
-            f"Pressed together, an outer corner is off by no more; {play['note'].split('; ')[1]}."
-        )
+        text = f"Pressed together: {play['note']}."
         cards.append(_answer("How loose is the box?", f"{_cell(play['figure'])} mm", text))
     if "box_mm" in summary:
         size = " × ".join(_cell(float(side)) for side in summary["box_mm"])

@@ -8,7 +8,7 @@ place, to where the hinges worked at just before and after are near.
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +54,11 @@ def hinge_distances(parent: I32) -> I32:
 
 def walk(path: I32, distances: I32) -> int:
     """How far hands walk on a path: the distances of hinges that follow each other, added up."""
-    hinges = np.asarray(path)[:, 0]
+    return _walked(np.asarray(path)[:, 0], distances)
+
+
+def _walked(hinges: Sequence[int] | I32, distances: I32) -> int:
+    """The same of the hinges in the order of their moves."""
     return int(distances[hinges[:-1], hinges[1:]].sum())
 
 
@@ -113,15 +117,19 @@ class _Order:
         gained = False
         for number in range(len(self._moves)):
             start = list(self._moves)
-            best, least = start, _walked(start, distances)
+            best, least = start, self._walk(distances)
             for way in (-1, 1):
                 self._moves, at = list(start), number
                 while self._swap(at + min(way, 0)):
                     at += way
-                    if (cost := _walked(self._moves, distances)) < least:
+                    if (cost := self._walk(distances)) < least:
                         best, least, gained = list(self._moves), cost, True
             self._moves = best
         return gained
+
+    def _walk(self, distances: I32) -> int:
+        """How far hands walk on the moves as they are now."""
+        return _walked([hinge for hinge, _ in self._moves], distances)
 
     def _swap(self, low: int) -> bool:
         """Exchange two neighbouring moves where both orders are free; False where they are not."""
@@ -141,8 +149,3 @@ class _Order:
             return False
         self._moves[low], self._moves[low + 1] = self._moves[low + 1], self._moves[low]
         return True
-
-
-def _walked(moves: list[tuple[int, NDArray[np.int16]]], distances: I32) -> int:
-    """How far hands walk on moves."""
-    return int(sum(distances[a, b] for (a, _), (b, _) in pairwise(moves)))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fabfold.export.camera import View, camera_for, project
 from fabfold.guide.fold_steps import FoldStep
 from fabfold.joinery.bodies import Joinery
+from fabfold.meshes import box_triangles
 from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["FIRST_VIEW", "LEAST_SEEN", "StepView", "step_views", "visible_share"]
@@ -73,32 +74,22 @@ class _Blocks:
         return np.asarray(np.einsum("vij,vj->vi", mine[:, :3, :3], self.vertices) + mine[:, :3, 3])
 
 
-_CUBE = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-_CUBE_FACES = np.array(
-    [
-        *((0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)),
-        *((2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)),
-    ],
-    dtype=np.int32,
-)
-
-
 def _blocks(joinery: Joinery, tree: FoldTree) -> _Blocks:
     """Cubes of the voxels; a body without voxels is a plate in its bounds."""
     cubes, owners = [], []
-    origin = np.asarray(joinery.origin_mm, dtype=float)
+    middles = np.asarray(joinery.origin_mm, dtype=float) + joinery.voxel_mm * tree.source
+    half = joinery.voxel_mm / 2
     for index, body in enumerate(tree.bodies):
-        for voxel in body.voxels:
-            cubes.append(origin + joinery.voxel_mm * (tree.source[voxel] + _CUBE))
-            owners.append(index)
-        if not len(body.voxels):
+        bounds = [(middles[voxel] - half, middles[voxel] + half) for voxel in body.voxels]
+        if not bounds:
             points = joinery.bodies[index].vertices
-            low, high = points.min(axis=0), points.max(axis=0)
-            cubes.append((low + high) / 2 + (high - low) * _CUBE)
-            owners.append(index)
-    faces = np.concatenate([_CUBE_FACES + 8 * number for number in range(len(cubes))])
+            bounds = [(points.min(axis=0), points.max(axis=0))]
+        cubes += [box_triangles(low, high) for low, high in bounds]
+        owners += [index] * len(bounds)
+    vertices = np.concatenate([corners for corners, _ in cubes])
+    faces = np.concatenate([faces + 8 * number for number, (_, faces) in enumerate(cubes)])
     owner = np.repeat(np.array(owners, dtype=np.int32), 8)
-    return _Blocks(np.concatenate(cubes), faces.astype(np.int32), owner)
+    return _Blocks(vertices, faces.astype(np.int32), owner)
 
 
 def visible_share(

@@ -16,8 +16,6 @@ __all__ = ["fitting_voxel", "largest_voxel"]
 
 #: What barrels stand out beyond the cells of a body, on both sides together, in voxel sides.
 _BARRELS = 0.3
-#: Room between a body and the edge of a plate, mm, on both sides together.
-_RIM_MM = 10.0
 
 
 def largest_voxel(tree: FoldTree, mode: PrintMode) -> float | None:
@@ -43,7 +41,9 @@ def largest_voxel(tree: FoldTree, mode: PrintMode) -> float | None:
         pieces = [list(range(len(tree.source)))]
     room = np.array(bed, dtype=float)
     if mode.apart:
-        room[:2] -= _RIM_MM
+        from fabfold.apart.plates import RIM_MM
+
+        room[:2] -= 2 * RIM_MM
     least = np.inf
     for voxels in pieces:
         cells = tree.source[voxels]

@@ -16,11 +16,17 @@ from fabfold.kit.stages import BuiltTree
 from fabfold.printing.checks import Check
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["figure_pictures", "place_of"]
+__all__ = ["bodies_named", "figure_pictures", "place_of"]
 
 _SIZE = (300, 225)
 _PICKED, _OTHER = (214, 74, 30), (222, 221, 217)
 _PATH = "smallest gap on the folding path"
+
+
+def bodies_named(text: str, names: Sequence[str]) -> list[int]:
+    """Indices of the bodies that a text names, such as the note of a check, sorted."""
+    found = re.findall(r"\b(?:body|link)-\d+\b", text)
+    return sorted({names.index(name) for name in found if name in names})
 
 
 def place_of(
@@ -40,10 +46,7 @@ def place_of(
     (bodies, angles) or None
         Indices of the bodies, and the angles of all hinges, degrees; None where it names no body.
     """
-    names = {body.name: index for index, body in enumerate(tree.bodies)}
-    bodies = [
-        names[word] for word in re.findall(r"\b(?:body|link)-\d+\b", check.note) if word in names
-    ]
+    bodies = bodies_named(check.note, [body.name for body in tree.bodies])
     angles = np.array(motion.angles_deg[0])
     if check.name == _PATH:
         moves = motion.certificate.get("moves", [])
@@ -62,7 +65,7 @@ def place_of(
         column = motion.moves[number][0]
         turn = motion.angles_deg[number, column] - angles[column]
         angles[column] += np.sign(turn) * min(abs(float(move[3])), abs(turn))
-    return sorted(set(bodies)), angles
+    return bodies, angles
 
 
 def figure_pictures(checks: Sequence[Check], built: BuiltTree) -> dict[str, bytes]:

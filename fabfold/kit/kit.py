@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fabfold.errors import KitError, RecipeError
-from fabfold.files import sha256_of, write_text
+from fabfold.files import write_text
 from fabfold.kit import keys
 from fabfold.kit.stage_runner import StageRunner
 from fabfold.kit.stages import BuiltTree, PlannedTree, build_first
@@ -183,9 +183,7 @@ class Kit(StageRunner):
         NoTreeError, NoFoldError
             If no round of the recipe finds one.
         """
-        if self.recipe.pick:
-            return [self._picked().candidate]
-        return [candidate for _, candidate in next(self._rounds().found())]
+        return [candidate for _, candidate in next(self._found())]
 
     def fold(self) -> PlannedTree:
         """Best tree with the keyframes of its folding path on the lattice (paper section 5).
@@ -343,9 +341,11 @@ class Kit(StageRunner):
 
     def _keep_inputs(self, store: StageStore) -> None:
         """Copy the files that the recipe names."""
-        for name, file in self._files.items():
+        recipe = self.recipe
+        digests = (recipe.sha256, recipe.template_sha256, recipe.actions_sha256)
+        for (name, file), digest in zip(self._files.items(), digests, strict=True):
             if file is not None:
-                store.keep(file, sha256_of(file), name)
+                store.keep(file, digest, name)
 
     def _rounds(self) -> Rounds:
         if "rounds" not in self._results:
@@ -421,20 +421,21 @@ class Kit(StageRunner):
         search = (self._rounds_of, self._open_progress, self.workers, self.scheduler)
         return self._once("pareto", lambda: solutions(self.recipe, *search))
 
-    def _picked(self) -> Solution:
+    def _found(self) -> Iterator[list[Found]]:
+        """What each round finds, or what was picked; nothing is searched before it is wanted."""
         from fabfold.search.pareto import picked
 
-        return picked(self.pareto(), self.recipe.pick)
+        if self.recipe.pick:
+            solution = picked(self.pareto(), self.recipe.pick)
+            yield [(solution.voxels, solution.candidate)]
+        else:
+            yield from self._rounds().found()
 
     def _planned_trees(self, progress: Progress | None = None) -> Iterator[PlannedTree]:
         """Every candidate of every round, best first, with its path as the recipe finds it."""
         from fabfold.kit.planning import paths_by_forces, planned_trees
 
-        if self.recipe.pick:
-            picked = self._picked()
-            trees = planned_trees([[(picked.voxels, picked.candidate)]])
-        else:
-            trees = planned_trees(self._rounds().found())
+        trees = planned_trees(self._found())
         if self.recipe.method == "physics":
             trees = paths_by_forces(trees, self._files["actions"], progress or SilentProgress())
         return trees

@@ -15,7 +15,7 @@ from fabfold.physics.unfolding import Unfolding
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["PhysicsPath", "physics_path"]
+__all__ = ["PhysicsPath", "path_of", "physics_path"]
 
 #: Time steps of unfolding and of matching.
 _UNFOLD, _MATCH = 3000, 2000
@@ -80,7 +80,7 @@ def physics_path(
         for number, action in enumerate(actions):
             progress.update(number / len(actions), f"action {number + 1}: {action.do}")
             unfolding.do(action)
-        return _path_of(unfolding)
+        return path_of(unfolding)
     carved: list[int] = []
     reason = ""
     for attempt in range(_ATTEMPTS):
@@ -91,7 +91,7 @@ def physics_path(
             progress.update(attempt / _ATTEMPTS, f"{told}: {action.do}")
             unfolding.do(action)
         try:
-            found = _path_of(unfolding)
+            found = path_of(unfolding)
         except NoFoldError as error:
             reason = str(error)
             carved += _in_the_way(unfolding)
@@ -114,8 +114,14 @@ def _in_the_way(unfolding: Unfolding) -> list[int]:
     return rest[:2]
 
 
-def _path_of(unfolding: Unfolding) -> PhysicsPath:
-    """The path where A and B have met; raises where they have not."""
+def path_of(unfolding: Unfolding) -> PhysicsPath:
+    """The path where A and B have met.
+
+    Raises
+    ------
+    NoFoldError
+        If they have not, or the motion leaves turns that one hinge at a time cannot make.
+    """
     if not unfolding.met:
         raise NoFoldError(
             f"A and B do not meet: a hinge stands {unfolding.difference_deg:.0f}° apart in them"

@@ -28,6 +28,9 @@ DEFAULT_PROFILE = "mjf-pa12"
 #: A length of a profile in mm.
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
 
+#: Grams a cubic centimetre, by the first word of a profile's material; resins are about 1.15.
+_DENSITY: Final[dict[str, float]] = {"PLA": 1.24, "PETG": 1.27, "PA12": 1.01}
+
 
 class ApartFit(BaseModel):
     """Gaps of a kit whose bodies are printed one by one and joined by loose pins, mm.
@@ -136,10 +139,6 @@ class Profile(BaseModel):
         """Weight of the material, g/cm³."""
         words = self.material.split()
         return _DENSITY.get(words[0] if words else "", 1.15)
-
-
-#: Grams a cubic centimetre, by the first word of a profile's material; resins are about 1.15.
-_DENSITY: Final[dict[str, float]] = {"PLA": 1.24, "PETG": 1.27, "PA12": 1.01}
 
 
 def profiles_folder() -> Path:

@@ -295,6 +295,8 @@ def _outside(
     origin, side = np.asarray(joinery.origin_mm), joinery.voxel_mm
     turn_back = tree.root_rotation.T.astype(float)
     filled = {tuple(cell): voxel for voxel, cell in enumerate(tree.target.tolist())}
+    cells = tree.template.cells.tolist()
+    outer = {tuple(cell): at for cell, at in zip(cells, tree.template.outer_faces(), strict=True)}
     points: list[F64] = []
     motions: list[F64] = []
     normals: list[F64] = []
@@ -302,10 +304,8 @@ def _outside(
     for voxel, body in enumerate(tree.voxel_body.tolist()):
         pose = poses[body]
         middle = pose[:3, :3] @ (origin + side * tree.source[voxel]) + pose[:3, 3]
-        for face, direction in enumerate(FACES.tolist()):
-            if tuple((tree.target[voxel] + direction).tolist()) in filled:
-                continue
-            normal = turn_back @ np.array(direction, dtype=float)
+        for face in np.flatnonzero(outer[tuple(tree.target[voxel].tolist())]).tolist():
+            normal = turn_back @ FACES[face].astype(float)
             u, v = across(normal)
             for i, j in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
                 point = middle + 0.5 * side * (normal + i * u + j * v)

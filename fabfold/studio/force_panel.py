@@ -19,7 +19,7 @@ from fabfold.physics.actions import (
     Unfold,
     Wait,
 )
-from fabfold.physics.lattice_path import lattice_path
+from fabfold.physics.forced_path import path_of
 from fabfold.physics.unfolding import Unfolding
 from fabfold.studio.kit_scene import KitScene, cube_meshes
 from fabfold.studio.page_tasks import PageTasks
@@ -202,19 +202,14 @@ class ForcePanel:
         self._draw()
 
     def _take(self) -> None:
-        unfolding = self._required()
-        if not unfolding.met:
+        try:
+            found = path_of(self._required())
+        except NoFoldError as error:
             raise NoFoldError(
-                f"A and B have not met: a hinge stands {unfolding.difference_deg:.0f}° apart in "
-                "them. Unfold further, help where they stick, then match"
-            )
-        path, left = lattice_path(unfolding.tree, unfolding.way_deg("A"), unfolding.way_deg("B"))
-        if path is None:
-            raise NoFoldError(
-                f"{left} of the turns cannot be made one hinge at a time; carve where voxels pass "
-                "each other closely, and begin again"
-            )
-        self._use(list(unfolding.actions))
+                f"{error}. Unfold further, help where they stick, or begin again and carve where "
+                "voxels pass each other closely; then match"
+            ) from error
+        self._use(list(found.actions))
 
     def _required(self) -> Unfolding:
         if self._unfolding is None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fabfold.errors import FabfoldError, NoFoldError
 from fabfold.fold.motion import motion_of
+from fabfold.kit.figure_pictures import bodies_named
+from fabfold.kit.kit import Kit
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.lattice.shipped import template_names
 from fabfold.printing.checks import Check
@@ -29,19 +29,13 @@ if TYPE_CHECKING:
 
     from fabfold.search.rounds import Found
 
-__all__ = ["StudioPage", "bodies_named"]
+__all__ = ["StudioPage"]
 
 #: Views of the scene, and what is seen in each.
 _VIEWS = ("Kit", "Model", "Grid", "Forces")
 
 #: Where one looks from.
 _CAMERA = (6.5, -7.5, 5.5)
-
-
-def bodies_named(text: str, names: list[str]) -> list[int]:
-    """Indices of the bodies that a text names, such as the note of a check."""
-    found = re.findall(r"\b(?:body|link)-\d+\b", text)
-    return sorted({names.index(name) for name in found if name in names})
 
 
 class StudioPage:
@@ -147,8 +141,7 @@ class StudioPage:
 
     def begin(self) -> None:
         """Read the model, and show what the kit has already."""
-        kit = self._steps.kit()
-        kit.listener = self.tasks
+        kit = self._kit()
         self.model.show(kit.solid(), visible=True)
         recipe = self._steps.recipe
         self.grid.begin(recipe.rotation, recipe.origin, recipe.pitch)
@@ -218,8 +211,10 @@ class StudioPage:
 
     # What is done, in the first thread ----------------------------------------------------------
 
-    def _kit(self) -> Any:
-        kit = self._steps.kit()
+    def _kit(self) -> Kit:
+        return self._heard(self._steps.kit())
+
+    def _heard(self, kit: Kit) -> Kit:
         kit.listener = self.tasks
         return kit
 
@@ -227,8 +222,7 @@ class StudioPage:
         kit = self._kit()
         if not kit.is_made("fold"):
             raise NoFoldError("there is no tree yet: search for one first")
-        planned: PlannedTree = kit.fold()
-        return planned
+        return kit.fold()
 
     def search(self) -> None:
         """Search with what the controls say, the best so far folding before one's eyes."""
@@ -242,7 +236,7 @@ class StudioPage:
             fields["template_sha256"] = ""
         self._steps.change(f"search {fields['template']}, {fields['effort']}", **fields)
         self._refresh()
-        kit = self._kit()
+        kit = self._heard(self._steps.new_kit())
         kit.on_better = self._show_better
         self.set_view("Kit")
         try:
@@ -250,18 +244,16 @@ class StudioPage:
         except StoppedError:
             # The best so far counts, where there is any.
             self.tasks.go_on()
-            kit = self._steps.kit(found=True)
-            kit.listener = self.tasks
-            kit.run("fold")
+            self._heard(self._steps.new_kit(seconds=0.0)).run("fold")
         self.forces.close()
         self._show_planned()
 
     def _show_better(self, found: Found) -> None:
         _, candidate = found
         tree = candidate.tree
-        words = self._words(PlannedTree(found[0], tree, motion_of(tree, candidate.path)))
-        self._best.content = f"Best so far: {words}"
         motion = motion_of(tree, candidate.path)
+        words = self._words(PlannedTree(found[0], tree, motion))
+        self._best.content = f"Best so far: {words}"
         self.fold.show(tree, motion, cube_meshes(tree), f"Best so far: {words}", play=True)
 
     @staticmethod
@@ -318,7 +310,7 @@ class StudioPage:
     def build(self) -> BuiltTree:
         """Make the bodies, and show them."""
         kit = self._kit()
-        built: BuiltTree = kit.join()
+        built = kit.join()
         gap = built.planned.motion.certificate["min_gap_mm"]
         words = self._words(built.planned)
         title = f"{words}. Proven gap on the whole path: {gap:g} mm."
@@ -334,7 +326,7 @@ class StudioPage:
         """Check the bodies; what fails comes first."""
         self.build()
         kit = self._kit()
-        checks: list[Check] = kit.check()
+        checks = kit.check()
         self._checks = sorted(checks, key=lambda check: check.ok)
         bad = sum(not check.ok for check in checks)
         self._verdict.content = (
@@ -368,7 +360,7 @@ class StudioPage:
     def export(self) -> None:
         """Write the kit."""
         self.build()
-        folder: Path = self._kit().export()
+        folder = self._kit().export()
         self.check()
         self.tasks.say(f"Kit written to {escaped(str(folder.resolve()))}")
 

@@ -126,13 +126,24 @@ class StudioSteps:
         self._write()
         return True
 
-    def kit(self, *, found: bool = False) -> Kit:
+    def kit(self) -> Kit:
         """The kit of the recipe that counts now; what was made of it is kept in memory.
+
+        Raises
+        ------
+        FabfoldError
+            If a file that the recipe names is gone.
+        """
+        known = self._kits.get(self.recipe.model_dump_json())
+        return self.new_kit() if known is None else known
+
+    def new_kit(self, seconds: float | None = None) -> Kit:
+        """The same kit afresh, with what its folder keeps: for a search that goes on.
 
         Parameters
         ----------
-        found : bool
-            Begin anew with the best of what an ended search has left, and search no further.
+        seconds : float or None
+            As of :class:`fabfold.kit.kit.Kit`; 0 takes the best of what an ended search has left.
 
         Raises
         ------
@@ -140,18 +151,17 @@ class StudioSteps:
             If a file that the recipe names is gone.
         """
         recipe, start = self.recipe, self._start
-        known = recipe.model_dump_json()
-        if found or known not in self._kits:
-            actions = None
-            if recipe.actions:
-                actions = find_input(recipe.actions, recipe.actions_sha256, self.folder, "actions")
-            template = start.template if recipe.template == start.recipe.template else None
-            self._kits.clear()  # Bodies of one kit fill enough memory.
-            self._kits[known] = Kit(
-                recipe, model=start.model, template=template, actions=actions, folder=self.folder,
-                seconds=0.0 if found else None,
-            )  # fmt: skip
-        return self._kits[known]
+        actions = None
+        if recipe.actions:
+            actions = find_input(recipe.actions, recipe.actions_sha256, self.folder, "actions")
+        template = start.template if recipe.template == start.recipe.template else None
+        kit = Kit(
+            recipe, model=start.model, template=template, actions=actions, folder=self.folder,
+            seconds=seconds,
+        )  # fmt: skip
+        # Bodies of one kit fill enough memory.
+        self._kits = {recipe.model_dump_json(): kit}
+        return kit
 
     # How they are kept --------------------------------------------------------------------------
 
