@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import permutations, product
+
 import numpy as np
 import pytest
 import trimesh
@@ -65,6 +67,50 @@ def test_the_place_does_not_matter(away: float, duck: Solid, cut: list[Voxels]) 
         moved(duck, duck.vertices + away * size * np.array([1, -0.7, 0.3])), BOX, **SHORT
     )
     assert_same(found, cut)
+
+
+def bracket() -> Solid:
+    """Flat faces, many of which lie on planes of the grid."""
+    foot = trimesh.creation.box((30, 10, 12))
+    arm = trimesh.creation.box((10, 40, 12)).apply_translation((-10, 15, 0))
+    whole = trimesh.boolean.union([foot, arm])
+    return solid_from_mesh("bracket", RawMesh(whole.vertices, whole.faces))
+
+
+def assert_same_but_for_symmetry(found: list[Voxels], wanted: list[Voxels]) -> None:
+    """Each equals its counterpart in one of the 48 ways in which a lattice lies on itself."""
+    assert len(found) == len(wanted)
+    for one, other in zip(found, wanted, strict=True):
+        ways = []
+        for order in permutations(range(3)):
+            for signs in product((1, -1), repeat=3):
+                cells = one.cells[:, order] * np.array(signs)
+                cells -= cells.min(axis=0)
+                place = np.lexsort(cells.T[::-1])
+                if np.array_equal(cells[place], other.cells):
+                    ways.append(np.abs(one.fill[place] - other.fill).max())
+        assert ways, "other cells"
+        assert min(ways) <= ROUNDING
+        assert one.lost_volume == pytest.approx(other.lost_volume, abs=ROUNDING)
+        assert one.pitch == pytest.approx(other.pitch, rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("digits", [np.float64, np.float32])
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("model", ["duck", "bracket"])
+def test_a_search_finds_the_same_voxels_however_the_model_lies(
+    model: str, mirrored: bool, digits: type, duck: Solid
+) -> None:
+    """Turned by any angle, mirrored, and written with coordinates of four bytes."""
+    solid = duck if model == "duck" else bracket()
+    turn = trimesh.transformations.rotation_matrix(0.7, (0.3, -1, 0.5))[:3, :3]
+    faces = np.asarray(solid.faces, dtype=np.int64)
+    if mirrored:
+        turn[0], faces = -turn[0], faces[:, ::-1]
+    points = (np.asarray(solid.vertices) @ turn.T).astype(digits).astype(np.float64)
+    found = voxelize(solid_from_mesh("turned", RawMesh(points, faces)), BOX, **SHORT)
+    assert_same_but_for_symmetry(found, voxelize(solid, BOX, **SHORT))
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ from dataclasses import replace
 import manifold3d
 import numpy as np
 import pytest
+import trimesh
 from typer.testing import CliRunner
 
 from fabfold.cli.app import app
@@ -107,6 +108,13 @@ def test_a_plate_gets_the_thickness_that_is_wanted():
     assert high - low == pytest.approx(4.0, abs=0.1)
     assert core.volume() == pytest.approx(50 * 40 * 4, rel=0.03)
     assert made.least == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_turned_model_grows_alike_to_a_thousandth():
+    model = lollipop()
+    turn = trimesh.transformations.rotation_matrix(0.9, (1, 0.4, -0.7))[:3, :3]
+    turned = thickened(replace(model, vertices=model.vertices @ turn.T), 6.0)
+    assert turned.solid.volume == pytest.approx(thickened(model, 6.0).solid.volume, rel=2e-3)
 
 
 def test_what_is_thick_enough_stays_the_same_object():

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from fabfold.solid.convert import to_manifold
-from fabfold.solid.scan import box_counts, scan_mesh, summed_volume
+from fabfold.solid.scan import TIE, box_counts, scan_mesh, summed_volume
 from fabfold.voxels.offsets import CellEnergy, best_axis_offsets, cell_energy, optimise_offsets
 from fabfold.voxels.warp import split_at_plane, warp_mesh
 
@@ -18,7 +18,7 @@ def mesh_arrays(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def centres(shape: tuple[int, int, int]) -> np.ndarray:
-    return np.moveaxis(np.indices(shape), 0, -1) + 0.5
+    return np.moveaxis(np.indices(shape), 0, -1) + 0.5 + TIE
 
 
 def random_rotation(seed: int) -> np.ndarray:

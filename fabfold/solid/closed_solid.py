@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,3 +67,27 @@ class Solid:
     def bounds(self) -> NDArray[np.float64]:
         """Smallest and largest corner of the bounding box, shape (2, 3), model units."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    def in_axes(self, axes: NDArray[np.float64]) -> Solid:
+        """The solid as it lies in other axes.
+
+        Parameters
+        ----------
+        axes : (3, 3) float64 array
+            One axis a row: an orthogonal matrix; of determinant -1 it mirrors the solid.
+
+        Returns
+        -------
+        Solid
+            With the same corners in the same order.
+        """
+        paint = self.paint
+        if paint is not None:
+            paint = replace(paint, corners=np.einsum("ijk,lk->ijl", paint.corners, axes))
+        mirrored = np.linalg.det(axes) < 0
+        return replace(
+            self,
+            vertices=np.einsum("ij,kj->ik", self.vertices, axes),
+            faces=np.ascontiguousarray(self.faces[:, ::-1]) if mirrored else self.faces,
+            paint=paint,
+        )

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.convert import decimated, to_manifold, to_mesh
+from fabfold.solid.own_axes import own_axes
 from fabfold.solid.union import MAX_TRIANGLES
 
 if TYPE_CHECKING:
@@ -160,10 +161,13 @@ def thickened(solid: Solid, thickness: float) -> Thickened:
         cavity that closes is filled.
     """
     radius = thickness / 2
+    # Balls of flat faces are set side by side, so in axes that turn with the model.
+    axes = own_axes(solid.vertices, solid.faces)
+    given, solid = solid, solid.in_axes(axes)
     balls = inner_balls(solid.vertices, solid.faces, radius)
     thin = _thin(balls, radius)
     if not thin.any():
-        return Thickened(solid, float("inf"), 0.0)
+        return Thickened(given, float("inf"), 0.0)
     centres = _spread(balls.centres[thin], radius / 5)
     skin = _round_solid(centres, radius)
     whole = _filled(to_manifold(solid.vertices, solid.faces) + skin)
@@ -171,7 +175,9 @@ def thickened(solid: Solid, thickness: float) -> Thickened:
     whole = decimated(whole.scale((1 / scale,) * 3), MAX_TRIANGLES).scale((scale,) * 3)
     points, faces = to_mesh(whole)
     return Thickened(
-        replace(solid, vertices=points, faces=np.ascontiguousarray(faces, dtype=np.int32)),
+        replace(solid, vertices=points, faces=np.ascontiguousarray(faces, dtype=np.int32)).in_axes(
+            axes.T
+        ),
         2 * _least(balls.centres[thin], balls.radii[thin], radius),
         float(thin.mean()),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,35 @@ class Placement:
     pitch: float
     first: NDArray[np.int64]
     offsets: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+    def in_axes(self, axes: NDArray[np.float64]) -> Placement:
+        """The same grid for the model in the axes that it had before.
+
+        Parameters
+        ----------
+        axes : (3, 3) float64 array
+            The orthogonal matrix by which the model's corners were multiplied before the grid was
+            placed. Where it mirrors, the grid of the unmirrored model is mirrored along lattice x.
+
+        Returns
+        -------
+        Placement
+            Its planes cut the model where those of this one cut it in the other axes.
+        """
+        rotation = np.einsum("ij,jk->ik", self.rotation, axes)
+        if np.linalg.det(axes) > 0:
+            return replace(self, rotation=rotation)
+        sign = np.array([-1.0, 1.0, 1.0])
+        x, y, z = self.offsets
+        first = self.first.copy()
+        first[0] = 2 - len(x) - first[0]
+        return replace(
+            self,
+            rotation=sign[:, None] * rotation,
+            origin=sign * self.origin,
+            first=first,
+            offsets=(-x[::-1], y, z),
+        )
 
 
 def colour_surplus(cells: NDArray[np.int32], capacity: Capacity) -> tuple[int, int]:

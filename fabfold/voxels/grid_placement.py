@@ -9,13 +9,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.solid.scan import box_counts_kernel
+from fabfold.solid.scan import TIE, box_counts_kernel
 from fabfold.voxels.offsets import CellEnergy
 
 __all__ = [
+    "SCORE_DIGITS",
     "SURPLUS_DROP_BELOW",
     "Capacity",
     "GridFit",
+    "RankedGrid",
     "grid_fit",
     "grid_rotations",
     "nearby_rotations",
@@ -24,6 +26,12 @@ __all__ = [
 
 #: Cells under this share of material may be dropped where a template has no room for their colour.
 SURPLUS_DROP_BELOW = 0.15
+
+
+#: Digits after the point of a score, so that rounding does not order two grids that are as good.
+SCORE_DIGITS = 9
+#: Two principal axes are not told apart where the model spreads along them alike, to this share.
+_ALIKE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -74,6 +82,29 @@ class GridFit:
     fills: NDArray[np.float64] = field(repr=False, compare=False)
 
 
+@dataclass(frozen=True)
+class RankedGrid:
+    """A regular grid, and its score on a coarse scan once its planes are moved there.
+
+    Attributes
+    ----------
+    score : float
+        That of `GridFit`, less a price for each excess cell;
+        higher is better.
+    rotation : int
+        Index into :attr:`fabfold.voxels.refinement.Refinement.rotations`.
+    pitch : float
+        Side of a voxel, model units.
+    origin : three floats
+        The centre of a cell: lattice axes, model units.
+    """
+
+    score: float
+    rotation: int
+    pitch: float
+    origin: tuple[float, float, float]
+
+
 def _from_quaternion(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
     w, x, y, z = (quaternion / np.linalg.norm(quaternion)).tolist()
     return np.array(
@@ -86,7 +117,7 @@ def _from_quaternion(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def grid_rotations(count: int, seed: int, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations of the model against the grid.
+    """Rotations of the model's own axes against the grid.
 
     Parameters
     ----------
@@ -95,28 +126,33 @@ def grid_rotations(count: int, seed: int, vertices: NDArray[np.float64]) -> NDAr
     seed : int
         Of the random rotations.
     vertices : (v, 3) float64 array
-        The model, for its principal axes; any unit.
+        The model in its own axes, for its principal axes; any unit.
 
     Returns
     -------
     (count, 3, 3) float64 array
-        Matrices from model axes to lattice axes: the identity, the model's principal axes, then
-        seeded random ones. Every third of these keeps the model upright (turned about z), the
-        others are uniform over all rotations.
+        Matrices from own axes to lattice axes: the identity, the model's principal axes (where it
+        has them), then seeded random ones. Every third of these turns about one of the own axes,
+        the others are uniform over all rotations.
     """
     rng = np.random.default_rng([seed, 3])
     spread = vertices - vertices.mean(axis=0)
     spread /= max(float(np.abs(spread).max()), 1e-300)
     # einsum, since a matrix product may sum in an order that depends on the number of threads.
-    axes = np.linalg.eigh(np.einsum("ij,ik->jk", spread, spread))[1].T[::-1]
+    lengths, axes = np.linalg.eigh(np.einsum("ij,ik->jk", spread, spread))
+    axes = axes.T[::-1]
     # eigh leaves the signs open: largest entry of each axis positive, and right-handed.
     axes = axes * np.sign(np.take_along_axis(axes, np.abs(axes).argmax(1)[:, None], 1))
     axes[2] *= np.sign(np.linalg.det(axes))
-    rotations = [np.eye(3), axes]
-    for index in range(max(0, count - 2)):
+    # Of a model that spreads alike along two axes, it leaves these open too.
+    distinct = np.diff(lengths).min() > _ALIKE * lengths.max()
+    rotations = [np.eye(3), *([axes] if distinct else [])]
+    for index in range(max(0, count - len(rotations))):
         if index % 3 == 0:
             half = rng.uniform(0.0, math.pi / 4)
-            rotations.append(_from_quaternion(np.array([math.cos(half), 0, 0, math.sin(half)])))
+            about = np.array([math.cos(half), 0.0, 0.0, 0.0])
+            about[3 - index // 3 % 3] = math.sin(half)
+            rotations.append(_from_quaternion(about))
         else:
             rotations.append(_from_quaternion(rng.normal(size=4)))
     return np.array(rotations[:count])
@@ -152,10 +188,7 @@ def nearby_rotations(
     return np.array(found).reshape(-1, 3, 3)
 
 
-#: So that halves are rounded up whatever the unit and place of the model, in subvoxels: where a
-#: plane falls may not depend on the last digit of its position.
-_TIE = 1e-6
-_HALF = 0.5 + _TIE
+_HALF = 0.5 + TIE
 
 
 @njit(cache=True)
@@ -287,7 +320,7 @@ def _rank_translations(table, pitch, steps, energy, capacity, drop_surplus_below
     size = np.array([table.shape[0] - 1, table.shape[1] - 1, table.shape[2] - 1])
     cells = np.zeros(3, dtype=np.int64)
     for axis in range(3):
-        cells[axis] = math.ceil(size[axis] / pitch - _TIE) + 1
+        cells[axis] = math.ceil(size[axis] / pitch - TIE) + 1
     most = cells[0] * cells[1] * cells[2]
     result = np.zeros((steps**3, 4))
     keep = np.zeros((cells[0], cells[1], cells[2]), dtype=np.bool_)
@@ -386,14 +419,13 @@ def rank_translations(
     (steps**3, 4) float64 array
         Score, cells kept, cells too many, and the share of the material that is lost.
     """
-    return np.asarray(
-        _rank_translations(
-            table,
-            float(pitch),
-            steps,
-            energy.arguments(),
-            (capacity.cells, *capacity.colours),
-            SURPLUS_DROP_BELOW,
-            float(excess_cost),
-        )
+    rows = _rank_translations(
+        table,
+        float(pitch),
+        steps,
+        energy.arguments(),
+        (capacity.cells, *capacity.colours),
+        SURPLUS_DROP_BELOW,
+        float(excess_cost),
     )
+    return np.asarray(rows.round(SCORE_DIGITS))

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from fabfold.lattice.template import Template
 from fabfold.progress import Progress
 from fabfold.solid.closed_solid import Solid
-from fabfold.solid.scan import box_counts, summed_volume
+from fabfold.solid.scan import TIE, box_counts, summed_volume
 from fabfold.voxels.cut import Placement, cut_voxels
 from fabfold.voxels.grid_placement import (
+    SCORE_DIGITS,
     Capacity,
     GridFit,
+    RankedGrid,
     grid_fit,
     nearby_rotations,
     rank_translations,
@@ -29,7 +31,7 @@ from fabfold.voxels.grid_placement import (
 from fabfold.voxels.offsets import CellEnergy, Offsets, optimise_offsets
 from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 
-__all__ = ["PITCHES", "RankedGrid", "RefinedGrid", "Refinement"]
+__all__ = ["PITCHES", "RefinedGrid", "Refinement"]
 
 #: Subvoxels along a voxel in the first round.
 _COARSE = 10
@@ -51,33 +53,10 @@ _AGAIN = 40
 _STEPS = 4
 #: Pitches added at most because they divide a side of the model evenly.
 _MOST_FITTED = 8
-#: What rounding errors may not decide: see :mod:`fabfold.voxels.grid_placement`.
-_TIE = 1e-6
+#: Relative difference under which two pitches are the same.
+_SAME = 1e-6
 #: Grids of a rotation whose planes are moved in the first round.
 _MOVED = 4
-
-
-@dataclass(frozen=True)
-class RankedGrid:
-    """A regular grid, and its score on a coarse scan once its planes are moved there.
-
-    Attributes
-    ----------
-    score : float
-        That of :class:`fabfold.voxels.grid_placement.GridFit`, less a price for each excess cell;
-        higher is better.
-    rotation : int
-        Index into :attr:`Refinement.rotations`.
-    pitch : float
-        Side of a voxel, model units.
-    origin : three floats
-        The centre of a cell: lattice axes, model units.
-    """
-
-    score: float
-    rotation: int
-    pitch: float
-    origin: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -118,10 +97,12 @@ class Refinement:
     ----------
     solid : Solid
         The model.
+    axes : (3, 3) float64 array
+        Orthogonal axes, one a row, in which it is looked at: model axes, or such that turn with it.
     template : Template
         The target shape, which limits the number of cells of each colour.
     rotations : (r, 3, 3) float64 array
-        Matrices from model axes to lattice axes, to be tried.
+        Matrices from these axes to lattice axes, to be tried.
     energy : CellEnergy
         What a cell costs, and which cells are dropped.
     limit : int
@@ -142,13 +123,15 @@ class Refinement:
     def __init__(
         self,
         solid: Solid,
+        axes: NDArray[np.float64],
         template: Template,
         rotations: NDArray[np.float64],
         energy: CellEnergy,
         limit: int,
     ) -> None:
-        self.vertices = np.array(solid.vertices, dtype=np.float64)
-        self.faces = np.array(solid.faces, dtype=np.int32)
+        self.axes = axes
+        seen = solid.in_axes(axes)
+        self.vertices, self.faces = seen.vertices, seen.faces
         self.volume = solid.volume
         self.extent = float(np.ptp(self.vertices, axis=0).max())
         self.template = template
@@ -328,8 +311,8 @@ class Refinement:
     def _fitted(self, rotation: int, pitches: NDArray[np.float64]) -> list[float]:
         """Pitches about as large as `pitches` that divide a side of the model evenly.
 
-        Only for the model's own axes and its principal axes, where they can mean something: a part
-        that is made of equal blocks is then cut between them.
+        Only for the first two rotations, own axes and principal axes, where they can mean
+        something: a part that is made of equal blocks is then cut between them.
         """
         if rotation > 1 or len(pitches) < 2:
             return []
@@ -337,8 +320,10 @@ class Refinement:
         cells = np.arange(1, self.capacity.cells + 1)
         sides = (extent[:, None] / cells).ravel()
         low, high = 0.85 * float(pitches.min()), 1.05 * float(pitches.max())
-        within = sides[(sides >= low) & (sides <= high)]
-        return [float(value) for value in np.unique(within)[:_MOST_FITTED]]
+        within = np.sort(sides[(sides >= low) & (sides <= high)])
+        # A third of one side may be half of another, but for the last digit.
+        fresh = np.diff(within, prepend=0.0) > _SAME * within
+        return [float(value) for value in within[fresh][:_MOST_FITTED]]
 
     def _coarsely_moved(
         self,
@@ -354,7 +339,7 @@ class Refinement:
         start = -_shift(row) / _STEPS * step
         regular = [
             np.floor(
-                start[axis] + step * np.arange(-1, np.ceil(size / step - _TIE) + 3) + 0.5 + _TIE
+                start[axis] + step * np.arange(-1, np.ceil(size / step - TIE) + 3) + 0.5 + TIE
             ).astype(np.int64)
             for axis, size in enumerate(table.shape)
         ]
@@ -376,7 +361,8 @@ class Refinement:
         size = widths[0][:, None, None] * widths[1][:, None] * widths[2]
         fit = grid_fit(box_counts(table, moved.planes) / size, self.energy, self.capacity)
         missed = abs(float(table[-1, -1, -1]) * side**3 - self.volume) / pitch**3
-        return replace(fit, score=fit.score - missed - moved.cost_of_moves(self.energy))
+        score = fit.score - missed - moved.cost_of_moves(self.energy)
+        return replace(fit, score=round(score, SCORE_DIGITS))
 
     def refine(
         self, item: RankedGrid, pitches: tuple[int, ...], hold_origin: bool
@@ -403,12 +389,12 @@ class Refinement:
         side = item.pitch / SUBDIVISION
         # The table begins on a plane of the grid, so that its planes are at whole subvoxels.
         corner = np.array(item.origin) - 0.5 * item.pitch
-        start = corner + np.floor((low - corner) / item.pitch - _TIE) * item.pitch
+        start = corner + np.floor((low - corner) / item.pitch - TIE) * item.pitch
         shape = _shape(high - start, side)
         if float(np.prod(np.array(shape, dtype=float))) > _FINE_LIMIT:
             return []
         table = summed_volume((vertices - start) / side, self.faces, shape)
-        inside = np.maximum(np.floor((low - start) / side + _TIE), 0).astype(np.int64)
+        inside = np.maximum(np.floor((low - start) / side + TIE), 0).astype(np.int64)
         window = np.ascontiguousarray(table[inside[0] :, inside[1] :, inside[2] :])
         results = []
         for units in pitches:
@@ -475,26 +461,31 @@ class Refinement:
             found.extend(self.refine(item, (SUBDIVISION,), hold_origin=False))
         return found
 
+    def placement(self, grid: RefinedGrid) -> Placement:
+        """The grid for the model as it was given.
+
+        Parameters
+        ----------
+        grid : RefinedGrid
+            One of this search.
+        """
+        return grid.placement.in_axes(self.axes)
+
     def cut(self, grid: RefinedGrid) -> tuple[Voxels | None, int, int]:
-        """Cut the model into voxels; see :func:`fabfold.voxels.cut.cut_voxels`.
+        """Cut the model; see :func:`fabfold.voxels.cut.cut_voxels`.
 
         Parameters
         ----------
         grid : RefinedGrid
             Where to cut.
-
-        Returns
-        -------
-        voxels : Voxels or None
-            None if the template cannot hold the cells, or no cell is left.
-        kept : int
-            Cells with enough material, in one group.
-        excess : int
-            Cells for which the template has no room; 0 if it holds them all.
         """
-        return cut_voxels(self.vertices, self.faces, grid.placement, self.energy, self.capacity)
+        voxels, kept, excess = cut_voxels(
+            self.vertices, self.faces, grid.placement, self.energy, self.capacity
+        )
+        # Cut as it was looked at, so that what is a tie there is not decided otherwise here.
+        return (None if voxels is None else voxels.in_axes(self.axes)), kept, excess
 
 
 def _shape(extent: NDArray[np.float64], side: float) -> tuple[int, int, int]:
-    x, y, z = np.maximum(np.ceil(extent / side - _TIE), 1).astype(int).tolist()
+    x, y, z = np.maximum(np.ceil(extent / side - TIE), 1).astype(int).tolist()
     return (x, y, z)

@@ -16,6 +16,7 @@ from fabfold.errors import NoVoxelsError, RecipeError
 from fabfold.lattice.template import Template
 from fabfold.progress import Progress, SilentProgress
 from fabfold.solid.closed_solid import Solid
+from fabfold.solid.own_axes import own_axes
 from fabfold.solid.thicken import Thickened, thickened
 from fabfold.voxels.features import features
 from fabfold.voxels.grid_placement import grid_rotations
@@ -194,8 +195,9 @@ class _PitchEstimate:
 
     def look(self, solid: Solid) -> tuple[float, bool]:
         """Side of a voxel in model units, and whether little of the volume is lost."""
-        rotations = grid_rotations(_LOOKS, self.seed, np.asarray(solid.vertices))
-        refinement = Refinement(solid, self.template, rotations, self.energy, 4)
+        axes = own_axes(solid.vertices, solid.faces)
+        rotations = grid_rotations(_LOOKS, self.seed, solid.in_axes(axes).vertices)
+        refinement = Refinement(solid, axes, self.template, rotations, self.energy, 4)
         for loss in _LOSSES:
             found, _ = refinement.pilot(loss)
             if found is not None:

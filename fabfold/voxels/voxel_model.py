@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,3 +66,39 @@ class Voxels:
 
     def __len__(self) -> int:
         return len(self.cells)
+
+    def in_axes(self, axes: NDArray[np.float64]) -> Voxels:
+        """The same voxels of the model in the axes that it had before.
+
+        Parameters
+        ----------
+        axes : (3, 3) float64 array
+            The orthogonal matrix by which the model's corners were multiplied before it was cut.
+            Where it mirrors, the voxels of the unmirrored model are mirrored along x.
+
+        Returns
+        -------
+        Voxels
+            With cells in their own order.
+        """
+        rotation = np.einsum("ij,jk->ik", self.rotation, axes)
+        if np.linalg.det(axes) > 0:
+            return replace(self, rotation=rotation)
+        sign = np.array([-1.0, 1.0, 1.0])
+        far = int(self.cells[:, 0].max())
+        shift = np.array([far, 0, 0])
+        cells = self.cells.copy()
+        cells[:, 0] = far - cells[:, 0]
+        order = np.lexsort(cells.T[::-1])
+        offsets_x, offsets_y, offsets_z = self.plane_offsets
+        return replace(
+            self,
+            cells=cells[order],
+            subvoxels=np.ascontiguousarray(self.subvoxels[order, ::-1]),
+            fill=self.fill[order],
+            vertices=self.vertices * sign + shift,
+            faces=np.ascontiguousarray(self.faces[:, ::-1]),
+            rotation=sign[:, None] * rotation,
+            origin=sign * (self.origin + self.pitch * shift),
+            plane_offsets=(-offsets_x[::-1], offsets_y, offsets_z),
+        )

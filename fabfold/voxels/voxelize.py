@@ -11,10 +11,11 @@ from fabfold.errors import NoVoxelsError, RecipeError
 from fabfold.lattice.template import Template
 from fabfold.progress import Progress, SilentProgress
 from fabfold.solid.closed_solid import Solid
+from fabfold.solid.own_axes import own_axes
 from fabfold.solid.regions import Region
-from fabfold.voxels.grid_placement import grid_rotations
+from fabfold.voxels.grid_placement import RankedGrid, grid_rotations
 from fabfold.voxels.offsets import CellEnergy
-from fabfold.voxels.refinement import PITCHES, RankedGrid, RefinedGrid, Refinement
+from fabfold.voxels.refinement import PITCHES, RefinedGrid, Refinement
 from fabfold.voxels.region_cells import region_cut_cost
 from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 
@@ -118,15 +119,18 @@ def voxelize(
     _check_numbers(placements, shortlist, results, drop_below, max_offset, max_loss, pitch)
     centre = None if origin is None else _checked_origin(origin)
     nearby = 0
+    # A grid that is free to turn is looked for in axes that turn with the model.
+    axes = np.eye(3)
     if rotation is not None:
         rotations = _checked_rotation(rotation)[None]
     elif centre is not None:
         rotations = np.eye(3)[None]
     else:
         nearby = int(_NEARBY * placements)
-        rotations = grid_rotations(placements - nearby, seed, np.asarray(solid.vertices))
+        axes = own_axes(solid.vertices, solid.faces)
+        rotations = grid_rotations(placements - nearby, seed, solid.in_axes(axes).vertices)
     refinement = Refinement(
-        solid, template, rotations, CellEnergy(drop_below=drop_below), max_offset
+        solid, axes, template, rotations, CellEnergy(drop_below=drop_below), max_offset
     )
     if not refinement.volume > 0:
         raise NoVoxelsError("the model encloses no volume; repair it first")
@@ -202,7 +206,7 @@ def _refined_grids(
             found.extend(refinement.refine_pitch(grid))
         found.sort(key=lambda grid: grid.sort_key)
     if regions:
-        price = {id(grid): region_cut_cost(regions, grid.placement) for grid in found}
+        price = {id(grid): region_cut_cost(regions, refinement.placement(grid)) for grid in found}
         found.sort(key=lambda grid: (grid.sort_key[0], grid.sort_key[1] + price[id(grid)]))
     return found
 
@@ -338,7 +342,8 @@ def _finish(
         voxels, _, _ = refinement.cut(grid)
         if voxels is None or voxels.lost_volume > max_loss:
             continue
-        price = region_cut_cost(regions, grid.placement) - voxels.energy["score"]
+        placement = refinement.placement(grid)
+        price = region_cut_cost(regions, placement) - voxels.energy["score"]
         done.append((price, voxels))
         chosen.append(grid)
         if len(done) == count:
