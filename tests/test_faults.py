@@ -62,13 +62,13 @@ def test_a_kit_that_was_moved_goes_on(bar_kit: Kit, tmp_path: Path) -> None:
     assert_same(folder, bar_kit.folder)
 
 
-def test_a_clock_that_jumps_does_not_matter(
-    bar: Path, bar_options: dict[str, Any], bar_kit: Kit, tmp_path: Path, monkeypatch: Any
+def test_a_clock_that_jumps_and_another_number_of_workers_do_not_matter(
+    bar_kit: Kit, tmp_path: Path, monkeypatch: Any
 ) -> None:
     jumps = itertools.cycle([0.0, -86_400.0, 86_400.0 * 365])
     real = time.time
     monkeypatch.setattr(time, "time", lambda: real() + next(jumps))
-    Kit.from_model(bar, folder=tmp_path / "kit", workers=1, **bar_options).export()
+    open_kit(str(bar_kit.folder / "kit.toml"), folder=tmp_path / "kit", workers=2).export()
     assert_same(tmp_path / "kit", bar_kit.folder)
 
 

@@ -85,15 +85,6 @@ def test_a_stage_done_is_read_not_made_again(bar_kit):
     assert again.solid().notes == bar_kit.solid().notes
 
 
-@pytest.mark.slow
-def test_the_recipe_makes_the_same_bytes_with_another_number_of_workers(bar_kit, tmp_path):
-    other = open_kit(str(bar_kit.folder / "kit.toml"), folder=tmp_path / "other", workers=2)
-    other.export()
-    first, second = files_of(bar_kit.folder), files_of(tmp_path / "other")
-    assert sorted(first) == sorted(second)
-    assert [name for name in first if first[name] != second[name]] == []
-
-
 def test_a_changed_recipe_makes_only_what_depends_on_it(bar_kit, tmp_path):
     shutil.copytree(bar_kit.folder, tmp_path / "kit")
     kit_again = open_kit(str(tmp_path / "kit"), voxel_mm=30.0)

@@ -19,7 +19,7 @@ from fabfold.voxels.voxel_model import Voxels
 from fabfold.voxels.voxelize import voxelize
 
 #: The same examples in every run, and no folder for those that failed.
-QUICK = settings(deadline=None, max_examples=12, derandomize=True, database=None)
+QUICK = settings(deadline=None, max_examples=4, derandomize=True, database=None)
 #: A search of a second.
 SHORT = {"placements": 8, "shortlist": 4, "results": 2}
 BOX = load_template("box-3x3x3")

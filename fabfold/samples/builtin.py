@@ -28,11 +28,13 @@ __all__ = [
     "Sample",
     "build_sample",
     "draw_meshes",
+    "drawn_from",
     "load_model",
     "load_sample",
     "mesh_sample",
     "sample",
     "sample_names",
+    "source_digest",
 ]
 
 #: What the name of a sample begins with where a model file could stand.
@@ -172,7 +174,49 @@ def draw_meshes() -> None:
     """Draw all samples, and write the meshes that come with the package."""
     for name in sample_names():
         solid = mesh_sample(build_sample(name), sample(name))
-        write_npz(_mesh_file(name), {"vertices": solid.vertices, "faces": solid.faces})
+        write_npz(
+            _mesh_file(name),
+            {
+                "vertices": solid.vertices,
+                "faces": solid.faces,
+                "source": np.array(source_digest(name)),
+            },
+        )
+
+
+def source_digest(name: str) -> str:
+    """Digest of the modules that draw a sample.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`sample_names`.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+    """
+    folder = Path(__file__).parent
+    sources = [folder / f"{name}.py", folder / "round_shapes.py"]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+
+
+def drawn_from(name: str) -> str:
+    """Digest of the modules that drew the mesh that comes with the package.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`sample_names`.
+
+    Returns
+    -------
+    str
+        :func:`source_digest` at that time.
+    """
+    with np.load(_mesh_file(name), allow_pickle=False) as data:
+        return str(data["source"])
 
 
 def load_model(source: str | Path, wanted: str = "") -> Solid:
