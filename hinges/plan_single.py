@@ -222,6 +222,7 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
     roofs = spec.pin.bore_cuts(layout, spec.bore_form)
     halves = []
     for owner, side in ((0, -1.0), (1, 1.0)):
+        overlapped = spec.chamfer or (bumps and not owner)
         halves.append(
             HalfPlan(
                 (groove(layout, owner, core), *access),
@@ -232,6 +233,7 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
                     *spec.leaf.hole_cuts(layout, spec.gap, side),
                     *(dimples if owner else ()),
                 ),
+                () if overlapped else (groove(layout, owner, spec.radius), *access),
             )
         )
     return SinglePlan(

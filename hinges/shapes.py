@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from math import cos, radians, sin
 
 __all__ = [
+    "Bounds",
     "HalfPlan",
     "Moved",
     "Point",
     "Prism",
     "Shape",
     "Turned",
+    "bounds",
     "box",
     "cylinder",
     "regular",
@@ -20,6 +22,8 @@ __all__ = [
 
 Point = tuple[float, float]
 Vector = tuple[float, float, float]
+#: Lowest and highest x, y and z in mm.
+Bounds = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -102,12 +106,46 @@ class HalfPlan:
         Knuckles, with their round bores and recesses.
     bore : tuple of Shape
         Cut from the finished half: roofs of bores, pockets, dimples, screw holes.
+    seat : tuple of Shape
+        `carve` with the outline of the half's own knuckles where it has a core inside of them, so
+        that ``web - seat`` only touches what is added, and ``(web - seat) + add`` is the same half.
+        Empty where something that is added reaches into the web or into a knuckle.
     """
 
     carve: tuple[Shape, ...]
     web: tuple[Shape, ...]
     add: tuple[Shape, ...]
     bore: tuple[Shape, ...] = ()
+    seat: tuple[Shape, ...] = ()
+
+
+def bounds(shape: Shape) -> Bounds:
+    """Box about a shape; of one that is turned by a part only, about the whole turn.
+
+    Parameters
+    ----------
+    shape : Turned, Prism or Moved
+        The shape.
+
+    Returns
+    -------
+    Bounds
+        Lowest and highest x, y and z in mm.
+    """
+    if isinstance(shape, Turned):
+        wide = max(radius for radius, _ in shape.outline)
+        along = [z for _, z in shape.outline]
+        return (-wide, wide), (-wide, wide), (min(along), max(along))
+    if isinstance(shape, Prism):
+        xs, ys = zip(*shape.outline, strict=True)
+        return (min(xs), max(xs)), (min(ys), max(ys)), (shape.start, shape.end)
+    inner = bounds(shape.shape)
+    made = []
+    for axis, origin in enumerate(shape.origin):
+        turn = [direction[axis] for direction in (shape.x_dir, shape.y_dir, shape.z_dir)]
+        reach = [sorted((t * a, t * b)) for t, (a, b) in zip(turn, inner, strict=True)]
+        made.append((origin + sum(r[0] for r in reach), origin + sum(r[1] for r in reach)))
+    return made[0], made[1], made[2]
 
 
 def cylinder(radius: float, start: float, end: float) -> Turned:
