@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from .exceptions import HingeError
-from .shapes import Bounds, HalfPlan, Moved, Prism, Shape, Turned, bounds
+from .shapes import Bored, Bounds, HalfPlan, Moved, Prism, Shape, Turned, bounds
 
 if TYPE_CHECKING:
     import build123d as bd
@@ -23,7 +24,7 @@ def build_shape(shape: Shape) -> bd.Solid:
 
     Parameters
     ----------
-    shape : Turned, Prism or Moved
+    shape : Shape
         What to build, in mm.
 
     Returns
@@ -36,8 +37,8 @@ def build_shape(shape: Shape) -> bd.Solid:
     if isinstance(shape, Moved):
         frame = bd.Plane(origin=shape.origin, x_dir=shape.x_dir, z_dir=shape.z_dir)
         return laid(build_shape(shape.shape), frame.location)
-    start = min(z for _, z in shape.outline) if isinstance(shape, Turned) else shape.start
-    return laid(_at_nought(_shifted(shape, start)), bd.Pos(0, 0, start))
+    start = bounds(shape)[2][0]
+    return laid(_at_nought(_shifted(shape, -start)), bd.Pos(0, 0, start))
 
 
 def laid(solid: bd.Solid, place: bd.Location) -> bd.Solid:
@@ -60,30 +61,41 @@ def laid(solid: bd.Solid, place: bd.Location) -> bd.Solid:
     return bd.Solid(solid.wrapped.Moved(place.wrapped))
 
 
-def _shifted(shape: Turned | Prism, start: float) -> Turned | Prism:
-    """A shape moved along z so that it begins at 0; equal ones are then the same to the last bit."""
+def _shifted(shape: Shape, by: float) -> Shape:
+    """A shape moved along z; equal knuckles that begin at 0 are the same to the last bit."""
+    if isinstance(shape, Bored):
+        return Bored(_shifted(shape.shape, by), tuple(_shifted(cut, by) for cut in shape.cuts))
     if isinstance(shape, Prism):
-        return Prism(shape.outline, 0.0, round(shape.end - start, 9), shape.holes)
-    outline = tuple((radius, round(z - start, 9)) for radius, z in shape.outline)
+        low, high = round(shape.start + by, 9), round(shape.end + by, 9)
+        return Prism(shape.outline, low, high, shape.holes)
+    if isinstance(shape, Moved):
+        x, y, z = shape.origin
+        return replace(shape, origin=(x, y, round(z + by, 9)))
+    outline = tuple((radius, round(z + by, 9)) for radius, z in shape.outline)
     return Turned(outline, shape.begin, shape.turn)
 
 
 @lru_cache(maxsize=256)
-def _at_nought(shape: Turned | Prism) -> bd.Solid:
+def _at_nought(shape: Shape) -> bd.Solid:
     """Build a shape that begins at z = 0; knuckles of one row are mostly equal."""
     import build123d as bd
 
+    if isinstance(shape, Moved):
+        return build_shape(shape)
+    if isinstance(shape, Bored):
+        (whole,) = solids_of(_at_nought(shape.shape).cut(*map(build_shape, shape.cuts)))
+        return whole
     if isinstance(shape, Prism):
         corners = set(shape.outline)
         (west, east), (south, north), _ = bounds(shape)
         if corners == {(x, y) for x in (west, east) for y in (south, north)} and not shape.holes:
-            frame = bd.Plane(origin=(west, south, 0))
-            return bd.Solid.make_box(east - west, north - south, shape.end, frame)
+            frame = bd.Plane(origin=(west, south, shape.start))
+            return bd.Solid.make_box(east - west, north - south, shape.end - shape.start, frame)
         rim, *inner = (
             bd.Wire.make_polygon([(x, y, shape.start) for x, y in outline], close=True)
             for outline in (shape.outline, *shape.holes)
         )
-        return bd.Solid.extrude(bd.Face(rim, inner), bd.Vector(0, 0, shape.end))
+        return bd.Solid.extrude(bd.Face(rim, inner), bd.Vector(0, 0, shape.end - shape.start))
     rim = bd.Wire.make_polygon([(r, 0, z) for r, z in shape.outline], close=True)
     turned = bd.Solid.revolve(bd.Face(rim), shape.turn, bd.Axis.Z)
     return turned.rotate(bd.Axis.Z, shape.begin) if shape.begin else turned

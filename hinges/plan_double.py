@@ -440,8 +440,7 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
         width = _width(spec)
         depth = width if spec.bracket.depth is None else spec.bracket.depth
         web = box(-width, -near, -depth, -_block_top(spec, axis), layout.start, layout.end)
-        barrels = spec.pin.knuckle_shapes(layout, spec.chamfer)
-        roofs = spec.pin.bore_cuts(layout, spec.bore_form)
+        barrels = spec.pin.knuckles(layout, spec.chamfer, spec.bore_form)
         carve: list[Shape] = [
             placed(rows, shape) for shape in spec.pin.insertion_cuts(layout, edge)
         ]
@@ -459,8 +458,7 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
                 (row(index, owner, core), *carve),
                 (placed(frame, web),),
                 tuple(placed(rows, shape) for who, shape in barrels if who == owner),
-                tuple(placed(rows, shape) for who, shape in roofs if who == owner),
-                () if spec.chamfer else (row(index, owner, spec.radius), *carve),
+                seat=() if spec.chamfer else (row(index, owner, spec.radius), *carve),
             )
         )
     in_link = [(spec.frame(index), layout) for index, layout in enumerate(layouts)]
@@ -470,16 +468,10 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
         tuple(
             placed(rows, shape)
             for rows, layout in in_link
-            for who, shape in spec.pin.knuckle_shapes(layout, spec.chamfer)
+            for who, shape in spec.pin.knuckles(layout, spec.chamfer, spec.bore_form)
             if who == 1
         ),
-        tuple(
-            placed(rows, shape)
-            for rows, layout in in_link
-            for who, shape in spec.pin.bore_cuts(layout, spec.bore_form)
-            if who == 1
-        ),
-        tuple(row(index, 1, spec.radius) for index in range(len(layouts)) if not spec.chamfer),
+        seat=tuple(row(index, 1, spec.radius) for index in range(len(layouts)) if not spec.chamfer),
     )
     loose = tuple(
         placed(rows, shape)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import cos, radians, sin
 
 __all__ = [
+    "Bored",
     "Bounds",
     "HalfPlan",
     "Moved",
@@ -69,7 +70,7 @@ class Moved:
 
     Attributes
     ----------
-    shape : Turned, Prism or Moved
+    shape : Shape
         The shape in its own frame.
     origin : (x, y, z)
         Where the shape's origin goes, in mm.
@@ -89,7 +90,23 @@ class Moved:
         return (b * f - c * e, c * d - a * f, a * e - b * d)
 
 
-Shape = Turned | Prism | Moved
+@dataclass(frozen=True)
+class Bored:
+    """A shape with others cut out of it, such as a knuckle with the roof over its bore.
+
+    Attributes
+    ----------
+    shape : Shape
+        The shape.
+    cuts : tuple of Shape
+        What is cut out of it, in the same frame.
+    """
+
+    shape: Shape
+    cuts: tuple[Shape, ...]
+
+
+Shape = Turned | Prism | Moved | Bored
 
 
 @dataclass(frozen=True)
@@ -103,9 +120,9 @@ class HalfPlan:
     web : tuple of Shape
         What joins the knuckles.
     add : tuple of Shape
-        Knuckles, with their round bores and recesses.
+        Knuckles, with their bores and recesses.
     bore : tuple of Shape
-        Cut from the finished half: roofs of bores, pockets, dimples, screw holes.
+        Cut from the finished half: dimples, screw holes, what is below a flat foot.
     seat : tuple of Shape
         `carve` with the outline of the half's own knuckles where it has a core inside of them, so
         that ``web - seat`` only touches what is added, and ``(web - seat) + add`` is the same half.
@@ -124,7 +141,7 @@ def bounds(shape: Shape) -> Bounds:
 
     Parameters
     ----------
-    shape : Turned, Prism or Moved
+    shape : Shape
         The shape.
 
     Returns
@@ -140,6 +157,8 @@ def bounds(shape: Shape) -> Bounds:
         xs, ys = zip(*shape.outline, strict=True)
         return (min(xs), max(xs)), (min(ys), max(ys)), (shape.start, shape.end)
     inner = bounds(shape.shape)
+    if isinstance(shape, Bored):
+        return inner
     made = []
     for axis, origin in enumerate(shape.origin):
         turn = [direction[axis] for direction in (shape.x_dir, shape.y_dir, shape.z_dir)]
