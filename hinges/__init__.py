@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     # For editors and type checkers; when it runs, names are imported on first use.
     from .ball_socket import BallSocket as BallSocket
     from .clearance import Clearance as Clearance
+    from .coupon_files import write_coupon as write_coupon
     from .double import DoubleHinge as DoubleHinge
     from .double import DoubleHingeCarve as DoubleHingeCarve
     from .double import DoubleHingePart as DoubleHingePart
@@ -51,7 +52,6 @@ if TYPE_CHECKING:
     from .stops import Detents as Detents
     from .stops import Stops as Stops
     from .tolerance_coupon import Coupon as Coupon
-    from .tolerance_coupon import write_coupon as write_coupon
 
 #: The module that each public name lives in.
 _HOMES = {
@@ -87,7 +87,7 @@ _HOMES = {
     "play": "joint_play",
     "total_play": "joint_play",
     "write_3mf": "print_files",
-    "write_coupon": "tolerance_coupon",
+    "write_coupon": "coupon_files",
     "write_step": "print_files",
 }
 

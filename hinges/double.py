@@ -20,7 +20,7 @@ from build123d import (
 
 from .clearance import Clearance
 from .double_poses import colliding_poses
-from .exact_solids import build_all, build_half, build_shape, one_part
+from .exact_solids import build_all, build_half, build_shape, laid, one_part
 from .exceptions import HingeError
 from .leaf import Bracket
 from .let_in import frame_at, let_in, one_body, require_edge
@@ -206,7 +206,7 @@ class DoubleHinge(PlacedPart):
         bodies: tuple[BodyName, ...] = ("parent", "link", "child")
         return one_part(
             [
-                _piece(_half_plan(self.spec, body), body).moved(_pose(self.spec, body))
+                laid(_piece(_half_plan(self.spec, body), body), _pose(self.spec, body))
                 for body in bodies
             ]
         )
@@ -370,7 +370,7 @@ class DoubleHingePart(PlacedPart):
         mode: Mode = Mode.ADD,
     ) -> None:
         body = _body(body)
-        part = one_part([_piece(_half_plan(hinge.spec, body), body).moved(_pose(hinge.spec, body))])
+        part = one_part([laid(_piece(_half_plan(hinge.spec, body), body), _pose(hinge.spec, body))])
         super().__init__(part=part, rotation=rotation, align=align, mode=mode)
         self.label = "link" if body == "link" else f"{body} half"
         self.color = Color(*COLORS[body])
@@ -403,6 +403,6 @@ class DoubleHingeCarve(PlacedPart):
         if body == "link":
             raise HingeError("the link is a body of its own: only parent and child are carved")
         pose = _pose(hinge.spec, body)
-        part = one_part([solid.moved(pose) for solid in _carve(_half_plan(hinge.spec, body))])
+        part = one_part([laid(solid, pose) for solid in _carve(_half_plan(hinge.spec, body))])
         super().__init__(part=part, rotation=rotation, align=align, mode=mode)
         self.label = f"{body} carve"

@@ -10,45 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .hidden_lines import visible_edges
+from .mesh import MeshPart
+
 if TYPE_CHECKING:
-    import build123d as bd
     from fpdf import FPDF
 
-__all__ = ["projected_edges", "write_guide"]
-
-Vector = tuple[float, float, float]
+__all__ = ["write_guide"]
 
 _FROM = (-25.0, -95.0, 110.0)  # where the coupon is seen from, mm
 _WIDTH, _HEIGHT = 174.0, 58.0  # largest size of the drawing on the page, mm
-_CHORD = 0.5  # longest chord of a curve in the drawing, mm of the part
-
-
-def projected_edges(
-    shape: bd.Shape, eye: Vector, up: Vector = (0.0, 0.0, 1.0)
-) -> list[NDArray[np.float64]]:
-    """Draw the visible edges of a part in parallel projection.
-
-    Parameters
-    ----------
-    shape : Shape
-        The part in mm.
-    eye : (float, float, float)
-        Point in mm from which it is seen, looking at the origin.
-    up : (float, float, float)
-        Direction that stands upright in the drawing.
-
-    Returns
-    -------
-    list of (n, 2) float64 array
-        Points along each edge in mm, to the right and upwards from the origin.
-    """
-    visible, _ = shape.project_to_viewport(eye, up, (0.0, 0.0, 0.0))
-    lines = []
-    for edge in visible:
-        count = 2 if edge.geom_type.name == "LINE" else int(edge.length / _CHORD) + 3
-        points = edge.positions(np.linspace(0.0, 1.0, count).tolist())
-        lines.append(np.array([(point.X, point.Y) for point in points]))
-    return lines
+_LINE, _ROW = 5.2, 5.8  # height of a line of words, and of a row of the table, mm
 
 
 def _draw(pdf: FPDF, lines: Sequence[NDArray[np.float64]]) -> None:
@@ -106,7 +78,13 @@ def _which_number(pdf: FPDF, clearances: Sequence[float]) -> None:
     pdf.ln(2)
 
 
-def write_guide(path: Path, clearances: Sequence[float], columns: bd.Shape, title: str) -> None:
+def write_guide(
+    path: Path,
+    clearances: Sequence[float],
+    columns: Sequence[MeshPart],
+    title: str,
+    pin_mm: float = 1.75,
+) -> None:
     """Write the one-page PDF.
 
     Parameters
@@ -115,10 +93,12 @@ def write_guide(path: Path, clearances: Sequence[float], columns: bd.Shape, titl
         File to write.
     clearances : sequence of float
         Clearances of the coupon in mm.
-    columns : Shape
-        What is drawn: the first columns of the coupon, lying on z = 0.
+    columns : sequence of MeshPart
+        What is drawn: the bodies of the first columns of the coupon, lying on z = 0.
     title : str
         Head of the page.
+    pin_mm : float
+        Diameter in mm of the pin that the bores are for.
     """
     from fpdf import FPDF
 
@@ -130,13 +110,16 @@ def write_guide(path: Path, clearances: Sequence[float], columns: bd.Shape, titl
     pdf.set_font("Helvetica", "B", 18)
     pdf.cell(0, 10, _plain(title), new_x="LMARGIN", new_y="NEXT")
     pdf.ln(2)
-    _draw(pdf, projected_edges(columns, _FROM))
+    _draw(pdf, visible_edges(columns, _FROM))
     pdf.set_font("Helvetica", "", 10.5)
     pdf.ln(2)
-    caption = "The first columns: flaps on hinges below the numbers, sockets for the plug above."
+    caption = "The first columns: flaps on hinges before the numbers, sockets and bores behind."
     pdf.cell(0, 6, caption, new_x="LMARGIN", new_y="NEXT", align="C")
     pdf.ln(2)
     _which_number(pdf, clearances)
+    filament = pin_mm in (1.75, 2.85)
+    pin = f"filament of {pin_mm:g} mm" if filament else f"the rod of {pin_mm:g} mm"
+    call = f"{'FilamentPin' if filament else 'RodPin'}({pin_mm:g}, grip=0.1, slip=0.2)"
     steps = [
         "Print it lying as it is, without supports, in the material and with the settings of the "
         "real part. Switch off 'slice gap closing' above 0.05 mm, beam interlocking and brims "
@@ -150,28 +133,32 @@ def write_guide(path: Path, clearances: Sequence[float], columns: bd.Shape, titl
         "coupon in finer steps:  fabfold coupon --around 0.3",
         "Push the plug into the sockets from the largest number down. The smallest that it goes "
         "into by hand is the clearance for parts that are put together and do not turn.",
+        f"For hinges with loose pins push a piece of {pin}, cut square, into the bores from the "
+        "largest number down. Note the smallest that it goes into by hand and stays in, for "
+        "--pin-grip, and the smallest in which it turns and slides by itself, for --pin-slip:  "
+        "fabfold calibrate --turns-freely 0.3 --pin-grip 0.2 --pin-slip 0.4 --profile NAME.  In "
+        f"CAD half of each goes into the pin:  {call}.",
         "If only the largest turns freely, clean the nozzle, check the flow, and print again. If "
         "the smallest does, you have an excellent printer: print a coupon with smaller ones.",
     ]
     for index, step in enumerate(steps, 1):
         pdf.set_font("Helvetica", "B", 10.5)
-        pdf.cell(8, 6, f"{index}.")
+        pdf.cell(8, _LINE, f"{index}.")
         pdf.set_font("Helvetica", "", 10.5)
-        pdf.multi_cell(0, 6, _plain(step), new_x="LMARGIN", new_y="NEXT")
+        pdf.multi_cell(0, _LINE, _plain(step), new_x="LMARGIN", new_y="NEXT")
         pdf.ln(1)
-    pdf.ln(2)
-    widths = (30, 35, 35, 74)
+    pdf.ln(1)
+    widths = (28, 28, 30, 32, 56)
+    heads = ("Number", "flap turns", "plug goes in", "pin stays / turns", "note")
     pdf.set_font("Helvetica", "B", 10)
-    for head, width in zip(
-        ("Clearance", "flap turns", "plug goes in", "note"), widths, strict=True
-    ):
-        pdf.cell(width, 7, head, border=1)
+    for head, width in zip(heads, widths, strict=True):
+        pdf.cell(width, _ROW, head, border=1)
     pdf.ln()
     pdf.set_font("Helvetica", "", 10)
     for clearance in clearances:
-        pdf.cell(widths[0], 7, f"{clearance:g} mm", border=1)
+        pdf.cell(widths[0], _ROW, f"{clearance:g} mm", border=1)
         for width in widths[1:]:
-            pdf.cell(width, 7, "", border=1)
+            pdf.cell(width, _ROW, "", border=1)
         pdf.ln()
     pdf.output(str(path))
 

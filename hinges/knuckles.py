@@ -152,7 +152,8 @@ def groove(layout: KnuckleLayout, owner: int, core: float) -> Turned:
     owner : int
         Number of the body that is cut.
     core : float
-        Radius in mm, below that of the barrel.
+        Radius in mm, below that of the barrel; or that of the barrel, for a body that only touches
+        its knuckles.
 
     Returns
     -------

@@ -42,7 +42,7 @@ from .options import BarrelKeywords, MeshKeywords, MeshOptions
 from .plan_double import DoubleSpec, plan_double, plate_shape
 from .plan_single import SinglePlan, SingleSpec, plan_single
 from .printed_pins import ConePin
-from .shapes import HalfPlan, Moved, Prism, Shape
+from .shapes import Bored, HalfPlan, Moved, Prism, Shape
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -155,7 +155,7 @@ def manifold_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
 
     Parameters
     ----------
-    shape : Turned, Prism or Moved
+    shape : Shape
         What to build, in mm.
     segments : int
         Number of corners of a full circle.
@@ -167,11 +167,15 @@ def manifold_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
     Manifold
         The shape in mm.
     """
-    from manifold3d import CrossSection, FillRule, Manifold
+    from manifold3d import CrossSection, FillRule, Manifold, OpType
 
     if isinstance(shape, Moved):
         frame = np.column_stack((shape.x_dir, shape.y_dir, shape.z_dir, shape.origin))
         return manifold_of(shape.shape, segments, outside=outside).transform(frame)
+    if isinstance(shape, Bored):
+        cuts = [manifold_of(cut, segments, outside=not outside) for cut in shape.cuts]
+        whole = manifold_of(shape.shape, segments, outside=outside)
+        return Manifold.batch_boolean([whole, *cuts], OpType.Subtract)
     if isinstance(shape, Prism):
         rims = [list(shape.outline), *(list(hole) for hole in shape.holes)]
         section = CrossSection(rims, FillRule.EvenOdd)

@@ -17,7 +17,7 @@ from .clearance import Clearance
 from .exceptions import HingeError
 from .fit import at_least
 from .knuckles import Knuckle, KnuckleLayout
-from .shapes import Point, Prism, Shape, Turned, regular, teardrop
+from .shapes import Bored, Point, Prism, Shape, Turned, bounds, regular, teardrop
 
 __all__ = ["BoreForm", "ContactCircle", "OwnedShape", "Pin", "barrel_end", "turned_knuckle"]
 
@@ -194,7 +194,7 @@ class Pin(ABC):
         """
 
     def bore_cuts(self, layout: KnuckleLayout, bore_form: BoreForm) -> tuple[OwnedShape, ...]:
-        """Plan what is cut out of the finished halves: roofs of bores, pockets of nuts.
+        """Plan what is cut out of single knuckles: roofs of bores, pockets of nuts.
 
         Parameters
         ----------
@@ -206,10 +206,40 @@ class Pin(ABC):
         Returns
         -------
         tuple of (int, Shape)
-            Number of the body and shape of each cut.
+            Number of the owner of the knuckle and shape of each cut, between its ends.
         """
         del layout, bore_form
         return ()
+
+    def knuckles(
+        self, layout: KnuckleLayout, chamfer: float, bore_form: BoreForm
+    ) -> tuple[OwnedShape, ...]:
+        """Shape every knuckle with all that is cut out of it.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        chamfer : float
+            Leg in mm of the 45° chamfer on the ends of barrels; 0 for none.
+        bore_form : BoreForm
+            How bores are closed above.
+
+        Returns
+        -------
+        tuple of (int, Shape)
+            Number of the owner and shape of each.
+        """
+        cuts = [
+            (owner, 0.5 * sum(bounds(cut)[2]), cut)
+            for owner, cut in self.bore_cuts(layout, bore_form)
+        ]
+        made: list[OwnedShape] = []
+        for owner, shape in self.knuckle_shapes(layout, chamfer):
+            low, high = bounds(shape)[2]
+            own = tuple(cut for who, middle, cut in cuts if who == owner and low < middle < high)
+            made.append((owner, Bored(shape, own) if own else shape))
+        return tuple(made)
 
     def insertion_cuts(self, layout: KnuckleLayout, edge: float) -> tuple[Shape, ...]:
         """Plan what both bodies give up beyond the knuckles so that a loose pin can go in.

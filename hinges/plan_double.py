@@ -427,7 +427,10 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
     core = 0.5 * (
         max(spec.pin.largest_radius(layout, spec.bore_form) for layout in layouts) + spec.radius
     )
-    links = [groove(layout, 1, core) for layout in layouts]
+
+    def row(index: int, owner: int, inside: float) -> Shape:
+        return placed(spec.frame(index), groove(layouts[index], owner, inside))
+
     edge = 0.5 * spec.size
     bodies = []
     for axis, index, owner in blocks:
@@ -437,10 +440,10 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
         width = _width(spec)
         depth = width if spec.bracket.depth is None else spec.bracket.depth
         web = box(-width, -near, -depth, -_block_top(spec, axis), layout.start, layout.end)
-        barrels = spec.pin.knuckle_shapes(layout, spec.chamfer)
-        roofs = spec.pin.bore_cuts(layout, spec.bore_form)
-        carve: list[Shape] = [placed(rows, groove(layout, owner, core))]
-        carve += [placed(rows, shape) for shape in spec.pin.insertion_cuts(layout, edge)]
+        barrels = spec.pin.knuckles(layout, spec.chamfer, spec.bore_form)
+        carve: list[Shape] = [
+            placed(rows, shape) for shape in spec.pin.insertion_cuts(layout, edge)
+        ]
         in_way: list[Shape] = [plate_shape(spec, spec.clearance.radial, _swing(spec))]
         if not spec.same_edge:
             other = layouts[1 - index]
@@ -452,32 +455,27 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
             carve += [placed(_about(frame, spec.turns[axis]), shape) for shape in in_way]
         bodies.append(
             HalfPlan(
-                tuple(carve),
+                (row(index, owner, core), *carve),
                 (placed(frame, web),),
                 tuple(placed(rows, shape) for who, shape in barrels if who == owner),
-                tuple(placed(rows, shape) for who, shape in roofs if who == owner),
+                seat=() if spec.chamfer else (row(index, owner, spec.radius), *carve),
             )
         )
-    in_link = [(spec.frame(index), layout, links[index]) for index, layout in enumerate(layouts)]
+    in_link = [(spec.frame(index), layout) for index, layout in enumerate(layouts)]
     link = HalfPlan(
-        tuple(placed(rows, cut) for rows, _, cut in in_link),
+        tuple(row(index, 1, core) for index in range(len(layouts))),
         (plate_shape(spec),),
         tuple(
             placed(rows, shape)
-            for rows, layout, _ in in_link
-            for who, shape in spec.pin.knuckle_shapes(layout, spec.chamfer)
+            for rows, layout in in_link
+            for who, shape in spec.pin.knuckles(layout, spec.chamfer, spec.bore_form)
             if who == 1
         ),
-        tuple(
-            placed(rows, shape)
-            for rows, layout, _ in in_link
-            for who, shape in spec.pin.bore_cuts(layout, spec.bore_form)
-            if who == 1
-        ),
+        seat=tuple(row(index, 1, spec.radius) for index in range(len(layouts)) if not spec.chamfer),
     )
     loose = tuple(
         placed(rows, shape)
-        for rows, layout, _ in in_link
+        for rows, layout in in_link
         for shape in spec.pin.hardware(layout, spec.bore_form)
     )
     return DoublePlan(spec, layouts, bodies[0], link, bodies[1], loose)

@@ -218,20 +218,20 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
             layout, widest, spec.chamfer, spec.angle, spec.angular_range
         )
     access = spec.pin.insertion_cuts(layout, 0.5 * spec.length)
-    barrels = spec.pin.knuckle_shapes(layout, spec.chamfer)
-    roofs = spec.pin.bore_cuts(layout, spec.bore_form)
+    barrels = spec.pin.knuckles(layout, spec.chamfer, spec.bore_form)
     halves = []
     for owner, side in ((0, -1.0), (1, 1.0)):
+        overlapped = spec.chamfer or (bumps and not owner)
         halves.append(
             HalfPlan(
                 (groove(layout, owner, core), *access),
                 (*spec.leaf.web(layout, spec.gap, side), *(lugs if owner else ())),
                 (*(shape for who, shape in barrels if who == owner), *(() if owner else bumps)),
                 (
-                    *(shape for who, shape in roofs if who == owner),
                     *spec.leaf.hole_cuts(layout, spec.gap, side),
                     *(dimples if owner else ()),
                 ),
+                () if overlapped else (groove(layout, owner, spec.radius), *access),
             )
         )
     return SinglePlan(

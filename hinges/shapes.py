@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from math import cos, radians, sin
 
 __all__ = [
+    "Bored",
+    "Bounds",
     "HalfPlan",
     "Moved",
     "Point",
     "Prism",
     "Shape",
     "Turned",
+    "bounds",
     "box",
     "cylinder",
     "regular",
@@ -20,6 +23,8 @@ __all__ = [
 
 Point = tuple[float, float]
 Vector = tuple[float, float, float]
+#: Lowest and highest x, y and z in mm.
+Bounds = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,7 @@ class Moved:
 
     Attributes
     ----------
-    shape : Turned, Prism or Moved
+    shape : Shape
         The shape in its own frame.
     origin : (x, y, z)
         Where the shape's origin goes, in mm.
@@ -85,7 +90,23 @@ class Moved:
         return (b * f - c * e, c * d - a * f, a * e - b * d)
 
 
-Shape = Turned | Prism | Moved
+@dataclass(frozen=True)
+class Bored:
+    """A shape with others cut out of it, such as a knuckle with the roof over its bore.
+
+    Attributes
+    ----------
+    shape : Shape
+        The shape.
+    cuts : tuple of Shape
+        What is cut out of it, in the same frame.
+    """
+
+    shape: Shape
+    cuts: tuple[Shape, ...]
+
+
+Shape = Turned | Prism | Moved | Bored
 
 
 @dataclass(frozen=True)
@@ -99,15 +120,51 @@ class HalfPlan:
     web : tuple of Shape
         What joins the knuckles.
     add : tuple of Shape
-        Knuckles, with their round bores and recesses.
+        Knuckles, with their bores and recesses.
     bore : tuple of Shape
-        Cut from the finished half: roofs of bores, pockets, dimples, screw holes.
+        Cut from the finished half: dimples, screw holes, what is below a flat foot.
+    seat : tuple of Shape
+        `carve` with the outline of the half's own knuckles where it has a core inside of them, so
+        that ``web - seat`` only touches what is added, and ``(web - seat) + add`` is the same half.
+        Empty where something that is added reaches into the web or into a knuckle.
     """
 
     carve: tuple[Shape, ...]
     web: tuple[Shape, ...]
     add: tuple[Shape, ...]
     bore: tuple[Shape, ...] = ()
+    seat: tuple[Shape, ...] = ()
+
+
+def bounds(shape: Shape) -> Bounds:
+    """Box about a shape; of one that is turned by a part only, about the whole turn.
+
+    Parameters
+    ----------
+    shape : Shape
+        The shape.
+
+    Returns
+    -------
+    Bounds
+        Lowest and highest x, y and z in mm.
+    """
+    if isinstance(shape, Turned):
+        wide = max(radius for radius, _ in shape.outline)
+        along = [z for _, z in shape.outline]
+        return (-wide, wide), (-wide, wide), (min(along), max(along))
+    if isinstance(shape, Prism):
+        xs, ys = zip(*shape.outline, strict=True)
+        return (min(xs), max(xs)), (min(ys), max(ys)), (shape.start, shape.end)
+    inner = bounds(shape.shape)
+    if isinstance(shape, Bored):
+        return inner
+    made = []
+    for axis, origin in enumerate(shape.origin):
+        turn = [direction[axis] for direction in (shape.x_dir, shape.y_dir, shape.z_dir)]
+        reach = [sorted((t * a, t * b)) for t, (a, b) in zip(turn, inner, strict=True)]
+        made.append((origin + sum(r[0] for r in reach), origin + sum(r[1] for r in reach)))
+    return made[0], made[1], made[2]
 
 
 def cylinder(radius: float, start: float, end: float) -> Turned:

@@ -22,7 +22,7 @@ from build123d import (
 
 from .clearance import Clearance
 from .edges import edge_frame
-from .exact_solids import build_all, build_half, build_shape, one_part
+from .exact_solids import build_all, build_half, build_shape, laid, one_part
 from .exceptions import HingeError
 from .leaf import Bracket, Leaf
 from .let_in import frame_at, let_in, one_body, require_edge
@@ -61,7 +61,7 @@ def _carve(spec: SingleSpec, side: Side) -> tuple[Solid, ...]:
 
 def _posed(spec: SingleSpec, side: Side, solids: tuple[Solid, ...]) -> Part:
     turn = Rotation(0, 0, spec.angle if side == "child" else 0.0)
-    return one_part([solid.moved(turn) for solid in solids])
+    return one_part([laid(solid, turn) for solid in solids])
 
 
 def _side(side: str) -> Side:

@@ -6,7 +6,7 @@ from fabfold.cli.app import app
 from fabfold.errors import RecipeError
 from fabfold.printing.calibrate import calibrate, write_profile
 from fabfold.printing.profiles import load_profile
-from hinges.tolerance_coupon import DEFAULT_CLEARANCES
+from hinges.coupon_plan import DEFAULT_CLEARANCES
 
 
 def test_a_calibrated_profile_survives_its_file(tmp_path):
@@ -52,6 +52,12 @@ def test_the_commands_write_coupon_and_profile(tmp_path, monkeypatch):
     done = run(app, ["calibrate", "--turns-freely", "0.275", "--around", "0.3", "-o", "fine.toml"])
     assert done.exit_code == 0, done.output
     assert load_profile("fine.toml").clearance_mm == 0.275
+    pins = ["--pin-grip", "0.2", "--pin-slip", "0.35", "-o", "pins.toml"]
+    done = run(app, ["calibrate", "--turns-freely", "0.3", "--profile", "fdm-pla-0.4", *pins])
+    assert done.exit_code == 0, done.output
+    assert load_profile("pins.toml").apart.slip_mm == 0.175
+    assert "pins stay at 0.1 mm and turn at 0.175 mm" in " ".join(done.output.split())
+    assert run(app, ["coupon", "--pin", "1.8"]).exit_code == 2
     assert run(app, ["coupon", "--around", "0.3", "--clearances", "0.3"]).exit_code == 2
     assert run(app, ["coupon", "--around", "0.01"]).exit_code == 2
     done = run(app, ["coupon", "-o", "coupon.xyz"])
@@ -69,9 +75,26 @@ def test_a_profile_for_bodies_apart_comes_back_with_the_clearance_that_was_read(
     assert (again.apart.face_gap_mm, again.apart.grip_mm, again.apart.slip_mm) == (0.2, 0.1, 0.2)
 
 
+def test_bores_for_pins_are_half_their_numbers_wider_in_radius(tmp_path):
+    shipped = load_profile("fdm-pla-0.4")
+    mine = calibrate(shipped, 0.3, pin_grip_mm=0.15, pin_slip_mm=0.35)
+    assert (mine.apart.grip_mm, mine.apart.slip_mm) == (0.075, 0.175)
+    assert "stays in a bore 0.15 mm wider and turns in a bore 0.35 mm wider" in mine.sources[1]
+    write_profile(tmp_path / "mine.toml", mine)
+    assert load_profile(str(tmp_path / "mine.toml")) == mine
+    half = calibrate(shipped, 0.3, pin_slip_mm=0.25)
+    assert (half.apart.grip_mm, half.apart.slip_mm) == (shipped.apart.grip_mm, 0.125)
+    tight = calibrate(shipped, 0.5, pin_grip_mm=0.15, pin_slip_mm=0.2)
+    write_profile(tmp_path / "tight.toml", tight)  # what must stay open is less than the slip
+    assert load_profile(str(tmp_path / "tight.toml")).apart.min_gap_mm == 0.05
+
+
 @pytest.mark.parametrize(
     ("turns", "more", "words"),
     [
+        (0.3, {"pin_grip_mm": 0.3, "pin_slip_mm": 0.3}, "--pin-grip 0.3 must be below --pin-slip"),
+        (0.3, {"pin_grip_mm": 0.45}, "below --pin-slip 0.4.*give both"),
+        (0.3, {"pin_slip_mm": 0.33}, "--pin-slip 0.33: give the number beside the bore"),
         (0.9, {}, "this coupon has 0.15, 0.2"),
         (0.3, {"fuses_mm": 0.12}, "--fuses 0.12"),
         (0.3, {"clearances": (0.6, 0.7)}, "this coupon has 0.6, 0.7"),

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from fabfold.apart.apart_kit import ApartKit
 from fabfold.apart.plates import Plates, on_plate
-from fabfold.export.bambu import BAMBU, bambu_plates, bambu_project
 from fabfold.export.render import thumbnail
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.files import write_json, write_text
 from fabfold.joinery.bodies import Joinery
 from fabfold.printing.print_mode import PINS
 from fabfold.tree.fold_tree import FoldTree
+from hinges.slicer_parts import BAMBU, bambu_plates, bambu_project
 
 __all__ = ["assembly_data", "bill_rows", "remove_plates", "write_bill", "write_plates"]
 

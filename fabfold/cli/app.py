@@ -15,18 +15,23 @@ import typer
 
 from fabfold.cli.command_options import (
     Actions,
+    Around,
     BoxMm,
     ClearanceMm,
+    Clearances,
     Closed,
     DoubleWeight,
     DropBelow,
     Effort,
     FitBed,
+    Fuses,
     Joints,
     JointsInside,
     Json,
     Keep,
     KeepWeight,
+    MadeAround,
+    MadeWith,
     MagnetName,
     Method,
     ObjectName,
@@ -34,7 +39,9 @@ from fabfold.cli.command_options import (
     Output,
     Pareto,
     Pick,
+    PinGrip,
     PinName,
+    PinSlip,
     Pitch,
     Prefer,
     Print,
@@ -53,6 +60,7 @@ from fabfold.cli.command_options import (
     TemplateName,
     Thicken,
     Time,
+    TurnsFreely,
     Void,
     VoxelMm,
     Workers,
@@ -412,43 +420,27 @@ def coupon(
         Path, typer.Option("--output", "-o", help="Ends in .3mf, .step or .stl.")
     ] = Path("coupon.3mf"),
     profile: ProfileName = None,
-    clearances: Annotated[
-        str | None,
-        typer.Option("--clearances", help="In mm, such as 0.2,0.3,0.4. Default: 0.15 to 0.50."),
-    ] = None,
-    around: Annotated[
-        float | None,
-        typer.Option("--around", help="A second coupon in steps of 0.025 mm about this clearance."),
-    ] = None,
+    clearances: Clearances = None,
+    around: Around = None,
+    pin: PinName = None,
 ) -> None:
     """Make a tolerance coupon: hinges at several clearances, and how to read them."""
     from fabfold.printing.profile_coupon import make_coupon
 
-    for path in make_coupon(output, profile, clearances, around):
+    for path in make_coupon(output, profile, clearances, around, pin or "1.75"):
         typer.echo(path)
 
 
 @app.command()
 @_guarded
 def calibrate(
-    turns_freely: Annotated[
-        float,
-        typer.Option(
-            "--turns-freely", help="Smallest clearance on the coupon whose hinge turns freely, mm."
-        ),
-    ],
+    turns_freely: TurnsFreely,
     profile: ProfileName = None,
-    fuses: Annotated[
-        float | None,
-        typer.Option("--fuses", help="Largest clearance on the coupon whose hinge is fused, mm."),
-    ] = None,
-    clearances: Annotated[
-        str | None,
-        typer.Option("--clearances", help="What the coupon was made with, where not the default."),
-    ] = None,
-    around: Annotated[
-        float | None, typer.Option("--around", help="What the second coupon was made around.")
-    ] = None,
+    fuses: Fuses = None,
+    pin_grip: PinGrip = None,
+    pin_slip: PinSlip = None,
+    clearances: MadeWith = None,
+    around: MadeAround = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="The new profile. Default: my-PROFILE.toml."),
@@ -463,10 +455,19 @@ def calibrate(
     name = "" if output is None else output.stem
     known = load_profile(profile or DEFAULT_PROFILE)
     values = coupon_clearances(clearances, around)
-    mine = calibrated(known, turns_freely, fuses_mm=fuses, name=name, clearances=values)
+    mine = calibrated(
+        known,
+        turns_freely,
+        fuses_mm=fuses,
+        pin_grip_mm=pin_grip,
+        pin_slip_mm=pin_slip,
+        name=name,
+        clearances=values,
+    )
     path = output or Path(f"{mine.name}.toml")
     write_profile(path, mine)
-    typer.echo(f"{path}: clearance {mine.clearance_mm:g} mm; use it with --profile {path}")
+    bores = f"pins stay at {mine.apart.grip_mm:g} mm and turn at {mine.apart.slip_mm:g} mm a side"
+    typer.echo(f"{path}: clearance {mine.clearance_mm:g} mm, {bores}; use it with --profile {path}")
 
 
 def _version(value: bool) -> None:

@@ -9,18 +9,23 @@ import typer
 
 __all__ = [
     "Actions",
+    "Around",
     "BoxMm",
     "ClearanceMm",
+    "Clearances",
     "Closed",
     "DoubleWeight",
     "DropBelow",
     "Effort",
     "FitBed",
+    "Fuses",
     "Joints",
     "JointsInside",
     "Json",
     "Keep",
     "KeepWeight",
+    "MadeAround",
+    "MadeWith",
     "MagnetName",
     "Method",
     "ObjectName",
@@ -28,7 +33,9 @@ __all__ = [
     "Output",
     "Pareto",
     "Pick",
+    "PinGrip",
     "PinName",
+    "PinSlip",
     "Pitch",
     "Prefer",
     "Print",
@@ -47,6 +54,7 @@ __all__ = [
     "TemplateName",
     "Thicken",
     "Time",
+    "TurnsFreely",
     "Void",
     "VoxelMm",
     "Workers",
@@ -335,3 +343,38 @@ Json = Annotated[
     typer.Option("--json", help="With 'check': the checks as JSON, and nothing else."),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")]
+Clearances = Annotated[
+    str | None,
+    typer.Option("--clearances", help="In mm, such as 0.2,0.3,0.4. Default: 0.15 to 0.50."),
+]
+Around = Annotated[
+    float | None,
+    typer.Option("--around", help="A second coupon in steps of 0.025 mm about this clearance."),
+]
+MadeWith = Annotated[
+    str | None,
+    typer.Option("--clearances", help="What the coupon was made with, where not the default."),
+]
+MadeAround = Annotated[
+    float | None, typer.Option("--around", help="What the second coupon was made around.")
+]
+TurnsFreely = Annotated[
+    float,
+    typer.Option(
+        "--turns-freely", help="Smallest clearance on the coupon whose hinge turns freely, mm."
+    ),
+]
+Fuses = Annotated[
+    float | None,
+    typer.Option("--fuses", help="Largest clearance on the coupon whose hinge is fused, mm."),
+]
+PinGrip = Annotated[
+    float | None,
+    typer.Option(
+        "--pin-grip", help="Number of the smallest bore that the pin goes into and stays in."
+    ),
+]
+PinSlip = Annotated[
+    float | None,
+    typer.Option("--pin-slip", help="Number of the smallest bore that the pin turns in by itself."),
+]

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fabfold.export.bambu import BAMBU
 from fabfold.export.colours import body_colours
 from fabfold.export.flat import flat_poses
 from fabfold.export.glb import write_glb
@@ -31,6 +30,7 @@ from fabfold.search.pareto import Solution
 from fabfold.solid.closed_solid import Solid
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.version import __version__
+from hinges.slicer_parts import BAMBU
 
 if TYPE_CHECKING:
     from fabfold.kit.kit import Kit

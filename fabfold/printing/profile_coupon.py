@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from fabfold.errors import RecipeError
+from fabfold.printing.print_mode import PINS
 from fabfold.printing.profiles import DEFAULT_PROFILE, load_profile
+from fabfold.toml_files import nearest
 
 __all__ = ["coupon_clearances", "make_coupon"]
 
@@ -15,6 +17,7 @@ def make_coupon(
     profile: str | None = None,
     clearances: str | None = None,
     around: float | None = None,
+    pin: str = "1.75",
 ) -> list[Path]:
     """Write a coupon whose walls suit a profile, with the page that tells how to read it.
 
@@ -28,6 +31,8 @@ def make_coupon(
         Clearances of the coupon's hinges in mm, with commas between.
     around : float, optional
         What a first coupon gave, mm: a second one in finer steps about it.
+    pin : str
+        Name of the loose pin that its bores are for, of :data:`fabfold.printing.print_mode.PINS`.
 
     Returns
     -------
@@ -39,16 +44,20 @@ def make_coupon(
     RecipeError
         If a value is wrong, or the hinges cannot be made with it.
     """
+    from hinges.coupon_files import write_coupon
     from hinges.exceptions import HingeError
-    from hinges.tolerance_coupon import write_coupon
 
+    if pin not in PINS:
+        raise RecipeError(f"--pin {pin}: {nearest(pin, list(PINS))}")
     known = load_profile(profile or DEFAULT_PROFILE)
     values = coupon_clearances(clearances, around)
     title = f"Hinge coupon, {known.name}"
     try:
         bed = None if known.bed_mm is None else known.bed_mm[:2]
         wall = max(0.8, known.min_wall_mm)
-        return write_coupon(path, values, wall_mm=wall, title=title, bed_mm=bed)
+        return write_coupon(
+            path, values, wall_mm=wall, pin_mm=PINS[pin][0], title=title, bed_mm=bed
+        )
     except HingeError as error:
         raise RecipeError(str(error)) from None
 
@@ -68,7 +77,7 @@ def coupon_clearances(text: str | None, around: float | None = None) -> tuple[fl
     RecipeError
         If these are no numbers, or both are given.
     """
-    from hinges.tolerance_coupon import DEFAULT_CLEARANCES, FINE_STEP, fine_clearances
+    from hinges.coupon_plan import DEFAULT_CLEARANCES, FINE_STEP, fine_clearances
 
     if around is not None:
         if text is not None:

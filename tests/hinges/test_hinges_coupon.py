@@ -9,16 +9,16 @@ import pytest
 from build123d import import_step
 
 from hinges import Coupon, FitError, HingeError
-from hinges.digits import raised_number
-from hinges.mesh import manifold_of
-from hinges.tolerance_coupon import (
+from hinges.coupon_files import write_coupon
+from hinges.coupon_plan import (
     DEFAULT_CLEARANCES,
-    _relieved,
     coupon_meshes,
     fine_clearances,
     plan_coupon,
-    write_coupon,
+    relieved,
 )
+from hinges.digits import raised_number
+from hinges.mesh import manifold_of
 
 FEW = (0.2, 0.35)
 
@@ -64,6 +64,20 @@ def test_the_plug_has_its_number_as_room_in_every_socket(solids):
         assert inside.min_gap(frame, 1.0) == pytest.approx(clearance, abs=1e-6)
 
 
+@pytest.mark.parametrize("pin", [1.75, 2.85])
+def test_every_bore_is_its_number_wider_than_the_pin(pin):
+    frame = solids_of(coupon_meshes(plan_coupon(DEFAULT_CLEARANCES, pin=pin)))[0]
+    for index, clearance in enumerate(DEFAULT_CLEARANCES):
+        outer = 0.5 * (pin + clearance) + 0.85
+        x, y = 13.2 * (index - 3.5), 2.8 + 2.0 * (2.5 + clearance + 0.85 - 0.4) + outer
+        inside = manifold3d.Manifold.cylinder(1.0, 0.5 * pin, circular_segments=64)
+        inside = inside.translate((x, y, 1.0))  # the pin in the middle of its bore
+        assert (inside ^ frame).volume() == pytest.approx(0.0, abs=1e-9)
+        assert inside.min_gap(frame, 1.0) == pytest.approx(0.5 * clearance, abs=0.004)
+        wall = frame.slice(2.5) ^ manifold3d.CrossSection.circle(outer + 0.01, 64).translate((x, y))
+        assert wall.area() == pytest.approx(np.pi * (outer**2 - (outer - 0.85) ** 2), rel=0.01)
+
+
 def test_flaps_turn_half_way_round_without_touching(solids):
     frame, flap = solids[0], solids[1]
     # the axis: 6.2 mm from the frame's middle line, at the height of the barrels' centre
@@ -76,7 +90,7 @@ def test_flaps_turn_half_way_round_without_touching(solids):
 
 def test_the_first_layers_stand_back_from_every_gap():
     bodies = plan_coupon(FEW)
-    plain, made = solids_of(coupon_meshes(bodies)), solids_of(_relieved(coupon_meshes(bodies)))
+    plain, made = solids_of(coupon_meshes(bodies)), solids_of(relieved(coupon_meshes(bodies)))
     for before, after in zip(plain, made, strict=True):
         assert len(after.decompose()) == 1
         foot, above = after.slice(0.15), after.slice(0.35)
@@ -197,6 +211,8 @@ def test_refusals(tmp_path):
         Coupon((0.3, 0.3))
     with pytest.raises(FitError, match=r"coupon hinge at 4\.5 mm"):
         plan_coupon((0.3, 4.5))
+    with pytest.raises(HingeError, match="a pin of 9 mm: give its diameter"):
+        plan_coupon((0.3,), pin=9.0)
     with pytest.raises(HingeError, match="cannot raise"):
         raised_number("0.3a", 0, 0, 0)
 

@@ -84,7 +84,8 @@ def test_prusa_sees_one_object_of_named_parts(lidded, tmp_path):
     colours = [c.get("color") for c in model.iter(f"{MATERIAL}color")]
     assert len(set(colours)) == 2
     assert all(re.fullmatch(r"#[0-9A-F]{6}FF", colour) for colour in colours)
-    paint = [t.get("p1") for t in model.iter(f"{CORE}triangle")]
+    (whole,) = model.iter(f"{CORE}object")  # what a triangle does not tell, its object does
+    paint = [t.get("p1", whole.get("pindex")) for t in model.iter(f"{CORE}triangle")]
     assert paint == ["0"] * (ranges[0][1] + 1) + ["1"] * (ranges[1][1] + 1 - ranges[1][0])
 
 

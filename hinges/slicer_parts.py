@@ -1,9 +1,10 @@
-"""The settings by which Bambu Studio and OrcaSlicer see named, coloured parts and plates in a 3MF.
+"""The settings by which slicers see named, coloured parts and plates in a 3MF.
 
-Both read ``Metadata/model_settings.config`` whoever wrote the file: one entry an object, with its
-parts. Plates and colours count only where the file's ``Application`` is Bambu Studio and
-``Metadata/project_settings.config`` is not empty. Few fields are written, all of them such as
-Bambu's own files have.
+PrusaSlicer and SuperSlicer read ``Metadata/Slic3r_PE_model.config``: which triangles of one object
+are which part. Bambu Studio and OrcaSlicer read ``Metadata/model_settings.config`` whoever wrote
+the file: one entry an object, with its parts. Plates and colours count only where the file's
+``Application`` is Bambu Studio and ``Metadata/project_settings.config`` is not empty. Few fields
+are written, all of them such as the slicers' own files have.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BAMBU", "UNIT_MATRIX", "bambu_model", "bambu_plates", "bambu_project"]
+__all__ = ["BAMBU", "PRUSA", "bambu_model", "bambu_plates", "bambu_project", "prusa_model"]
 
 #: What ``Application`` says: the release whose form is written.
 BAMBU = "BambuStudio-01.09.00.00"
+PRUSA = "PrusaSlicer-2.9.0"
 #: Matrix of a part that stays where it is, as both families of slicers write it.
-UNIT_MATRIX = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
+_UNIT_MATRIX = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
 _HEAD = ['<?xml version="1.0" encoding="UTF-8"?>', "<config>"]
 
 
@@ -28,10 +30,53 @@ def _part(number: int, name: str, filament: int) -> list[str]:
     return [
         f'    <part id="{number}" subtype="normal_part">',
         f'      <metadata key="name" value={quoteattr(name)}/>',
-        f'      <metadata key="matrix" value="{UNIT_MATRIX}"/>',
+        f'      <metadata key="matrix" value="{_UNIT_MATRIX}"/>',
         f'      <metadata key="extruder" value="{filament}"/>',
         "    </part>",
     ]
+
+
+def prusa_model(
+    whole: int, title: str, parts: Sequence[tuple[str, int]], *, filaments: bool
+) -> str:
+    """``Slic3r_PE_model.config`` of one object with named parts.
+
+    Parameters
+    ----------
+    whole : int
+        Number of the object whose mesh holds the parts, one after another.
+    title : str
+        Its name.
+    parts : sequence of (str, int)
+        Name of each part, and how many triangles it has.
+    filaments : bool
+        Whether each part is printed in a filament of its own.
+
+    Returns
+    -------
+    str
+        XML.
+    """
+    lines = [
+        *_HEAD,
+        f' <object id="{whole}" instances_count="1">',
+        f'  <metadata type="object" key="name" value={quoteattr(title)}/>',
+    ]
+    start = 0
+    for index, (name, count) in enumerate(parts):
+        facts = {"name": name, "volume_type": "ModelPart", "matrix": _UNIT_MATRIX}
+        if filaments:
+            facts["extruder"] = str(index + 1)
+        lines += [
+            f'  <volume firstid="{start}" lastid="{start + count - 1}">',
+            *(
+                f'   <metadata type="volume" key="{key}" value={quoteattr(value)}/>'
+                for key, value in facts.items()
+            ),
+            "  </volume>",
+        ]
+        start += count
+    return "\n".join([*lines, " </object>", "</config>", ""])
 
 
 def bambu_model(whole: int, title: str, parts: Sequence[tuple[int, str]]) -> str:
