@@ -18,6 +18,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     # For editors and type checkers; when it runs, names are imported on first use.
+    from .arm import Arm as Arm
     from .ball_socket import BallSocket as BallSocket
     from .clearance import Clearance as Clearance
     from .double import DoubleHinge as DoubleHinge
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
 
 #: The module that each public name lives in.
 _HOMES = {
+    "Arm": "arm",
     "BallSocket": "ball_socket",
     "Bracket": "leaf",
     "Clearance": "clearance",

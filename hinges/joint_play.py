@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .arm import Mount
 from .exceptions import HingeError
 from .plan_single import SinglePlan, SingleSpec, plan_single
 from .shapes import HalfPlan
@@ -137,21 +138,15 @@ def contacts(plan: SinglePlan, angle: float) -> tuple[Floats, Floats, Floats]:
         side = -1.0 if pin_owner == 0 else 1.0
         across, along = circled.normal
         add(circle, circled.radius, circled.z, (side * across, side * along), circled.gap)
-    _, far, top, bottom = spec.leaf.limits(layout, spec.gap)
-    reach = layout.groove_radius
-    low = -asin(min(1.0, bottom / reach))
-    if far > 0.0:
-        low = max(low, -acos(min(1.0, 0.5 * spec.gap / reach)))
-    high = -asin(min(1.0, top / reach))
-    count = max(2, int((high - low) / _STEP) + 1)
-    arc = np.linspace(low, high, count)
+    grooves = [_groove_arc(mount, plan) for mount in spec.mounts]
     for knuckle in layout.knuckles:
         ends = (knuckle.start, knuckle.end)
         for z in ends:
             if knuckle.owner == 0:  # the parent's barrel in the child's groove
-                add(arc + np.radians(angle), layout.radius, z, (-1.0, 0.0), spec.clearance.radial)
+                where = grooves[1] + np.radians(angle)
+                add(where, layout.radius, z, (-1.0, 0.0), spec.clearance.radial)
             else:  # the child's barrel in the parent's
-                add(pi - arc, layout.radius, z, (1.0, 0.0), spec.clearance.radial)
+                add(pi - grooves[0], layout.radius, z, (1.0, 0.0), spec.clearance.radial)
     rims = (layout.radius - spec.chamfer, spec.pin.largest_radius(layout, spec.bore_form))
     for one, after in zip(layout.knuckles, layout.knuckles[1:], strict=False):
         direction = -1.0 if one.owner == 0 else 1.0
@@ -164,6 +159,17 @@ def contacts(plan: SinglePlan, angle: float) -> tuple[Floats, Floats, Floats]:
                 layout.clearance.axial,
             )
     return np.concatenate(points), np.concatenate(normals), np.concatenate(gaps)
+
+
+def _groove_arc(mount: Mount, plan: SinglePlan) -> Floats:
+    """Directions, in radians, in which a body has a groove; none where an arm keeps it away."""
+    near, _, top, bottom = mount.limits(plan.layout, plan.spec.gap)
+    reach = plan.layout.groove_radius
+    if near >= reach or top >= reach:
+        return np.empty(0)
+    low = max(-asin(min(1.0, bottom / reach)), -acos(near / reach))
+    high = -asin(max(-1.0, top / reach))
+    return np.linspace(low, high, max(2, int((high - low) / _STEP) + 1))
 
 
 def play(
