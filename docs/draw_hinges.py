@@ -26,6 +26,7 @@ from hinges import (
     DoubleHinge,
     FilamentPin,
     Leaf,
+    LiftPin,
     Magnet,
     MagnetPocket,
     RodPin,
@@ -139,6 +140,13 @@ def single_pictures() -> None:
                 "Bracket(gusset=True)",
                 picture(halves(SingleHinge(30, leaf=Bracket(gusset=True), **leaf))),
             ),
+            (
+                "Bracket(flat=True)",
+                picture(
+                    halves(SingleHinge(30, clearance=0.3, leaf=Bracket(flat=True))),
+                    replace(LYING, elevation_deg=-28.0),
+                ),
+            ),
             ("Leaf(14, 2)", picture(halves(SingleHinge(40, leaf=Leaf(14, 2), **leaf)))),
             (
                 "Leaf(..., holes=3, sink=6)",
@@ -197,7 +205,7 @@ def arm_pictures() -> None:
             ("Arm.pair(14, fill=False, angle=60)", draw(Arm.pair(14, fill=False, angle=60))),
             (
                 "(Arm(offset=7, ...), Arm(height=6))",
-                draw((Arm(offset=7, clear_top=True), Arm(height=6))),
+                draw(uneven),
             ),
         ],
     )
@@ -265,6 +273,17 @@ def pin_pictures() -> None:
         hinge = SingleHinge(**{"length": 20, "clearance": 0.3, **options})
         rows.append((text, picture(cut(halves(hinge)), ACROSS)))
     page("pins.png", rows)
+    hinge = SingleHinge(24, knuckles=2, clearance=0.3, pin=LiftPin(1.5, at=90), angle=90)
+    near = replace(LYING, azimuth_deg=30.0, elevation_deg=40.0)
+    off = hinge.child_half.moved(Pos(0, 0, 14))
+    page(
+        "lift.png",
+        [
+            ("LiftPin(1.5, at=90), cut open", picture(cut(halves(hinge)), ACROSS)),
+            ("the tooth on the pin", picture([hinge.parent_half], near, y_up=False)),
+            ("lifted off at 90°", picture([hinge.parent_half, off], near, y_up=False)),
+        ],
+    )
     rows = []
     for bore in ("round", "teardrop", "octagon"):
         hinge = SingleHinge(24, clearance=0.3, pin=ScrewPin("M3"), bore=bore)

@@ -30,12 +30,14 @@ if TYPE_CHECKING:
     from .exceptions import KernelError as KernelError
     from .hardware import FilamentPin as FilamentPin
     from .hardware import RodPin as RodPin
+    from .hardware import Screw as Screw
     from .hardware import ScrewPin as ScrewPin
     from .joint_play import Play as Play
     from .joint_play import play as play
     from .joint_play import total_play as total_play
     from .leaf import Bracket as Bracket
     from .leaf import Leaf as Leaf
+    from .lift_pin import LiftPin as LiftPin
     from .living_hinge import LivingHinge as LivingHinge
     from .print_files import write_3mf as write_3mf
     from .print_files import write_step as write_step
@@ -73,11 +75,13 @@ _HOMES = {
     "HingeHalf": "single",
     "KernelError": "exceptions",
     "Leaf": "leaf",
+    "LiftPin": "lift_pin",
     "LivingHinge": "living_hinge",
     "Magnet": "retention",
     "MagnetPocket": "retention",
     "Play": "joint_play",
     "RodPin": "hardware",
+    "Screw": "hardware",
     "ScrewPin": "hardware",
     "SingleHinge": "single",
     "SnapDimple": "retention",

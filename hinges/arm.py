@@ -29,8 +29,12 @@ _BESIDE = 0.1
 _FAR = 1e3
 #: Thickness of an arm over that of its barrel: its sides cut the barrel and do not just touch it.
 _SLIM = 0.98
+#: How far a rounding reaches into the arm, in mm.
+_OVERLAP = 0.2
 #: How much smaller the bar in the wall is than the foot, above and below, in mm.
 _INSET = 0.05
+#: Detail that an outline does not keep, in mm.
+_FINE = 1e-5
 #: Step of the arcs of roundings, in degrees.
 _STEP = 7.5
 
@@ -156,7 +160,10 @@ class Arm:
         # Folded, the other body's edge lies one gap beyond the top and looks at the arm's slope.
         over += gap / sin(lean) - gap
         above = -0.5 * gap if self.clear_top is not False else over
-        return max(0.0, above - self._along(layout) - self.top(gap))
+        needed = max(0.0, above - self._along(layout) - self.top(gap))
+        if self.clear_top is not False and self.top(gap) < -0.5 * layout.radius:
+            return max(needed, -self.top(gap))  # or the barrel would hang above what is left
+        return needed
 
     def _ends(self, layout: KnuckleLayout, gap: float) -> tuple[float, float]:
         """Lower and upper end of the bare sloped part on the wall, y in mm."""
@@ -227,6 +234,8 @@ class Arm:
             fall = start / self._slope()
             left = min(top, half - upright - fall) + upright + fall + half
             words = "what clear_top leaves of the arm"
+            if not upright:
+                left = min(left, top + layout.radius)
             at_least("arm", words, left, wall, "use a taller height, or clear_top=False")
         at_least(
             "arm",
@@ -321,10 +330,10 @@ class Arm:
             (self.round_top, self.angle - 180.0, high, 1.0 / tan(0.5 * lean)),
         ):
             if radius:
-                drawn += _rounding(wall, end, radius, radius * tangent, turn)
+                drawn += _rounding((wall, back), end, radius, radius * tangent, turn)
         if self.clear_top is not False:
-            near = wall if self.clear_top is True else float(self.clear_top)
-            west = -_FAR if self.clear_top is True else wall - near
+            west = -_FAR if self.clear_top is True else wall - float(self.clear_top)
+            west = max(west, r) if upright else west
             drawn -= polygon((west, top), (_FAR, top), (_FAR, _FAR), (west, _FAR))
         drawn += stem
         if self.clip is not None:
@@ -351,7 +360,7 @@ class Arm:
         HingeError
             If the arm comes out in pieces.
         """
-        rims = self.section(layout, gap).to_polygons()
+        rims = self.section(layout, gap).simplify(_FINE).to_polygons()
         if len(rims) != 1:
             raise HingeError(
                 f"arm: clip or clear_top cuts it into {len(rims)} outlines: cut less away"
@@ -385,19 +394,24 @@ Mount = Bracket | Leaf | Arm
 """What joins the knuckles of a half to its body."""
 
 
-def _rounding(wall: float, corner: float, radius: float, along: float, turn: float) -> CrossSection:
+def _rounding(
+    wall: tuple[float, float], corner: float, radius: float, along: float, turn: float
+) -> CrossSection:
     """Draw what a rounding adds between the wall and a side of the arm.
 
     The circle touches the wall `along` mm above the corner, and the arm where it has gone round by
-    `turn` degrees.
+    `turn` degrees. It reaches as deep into the wall as the arm does.
     """
     from manifold3d import CrossSection
 
     count = max(2, round(abs(turn) / _STEP))
-    x, y = wall - radius, corner + along
+    x, y = wall[0] - radius, corner + along
     arc = [radians(turn * index / count) for index in range(count + 1)]
     rim = [(x + radius * cos(at), y + radius * sin(at)) for at in arc]
-    points = [(wall, corner), *rim]
+    # It overlaps the arm: outlines that share a line do not unite cleanly.
+    inside = -_OVERLAP if along > 0.0 else _OVERLAP
+    end = ((px - c) * (1.0 + _OVERLAP / radius) + c for px, c in zip(rim[-1], (x, y), strict=True))
+    points = [(wall[1], corner + inside), (wall[1], y), *rim, (next(end), next(end))]
     return CrossSection([points if turn < 0.0 else points[::-1]])
 
 

@@ -43,7 +43,7 @@ class Play:
     radial_least : float
         The same in the direction that allows least.
     axial : (float, float)
-        Largest shift along -z and +z in mm.
+        Largest shift along -z and +z in mm; infinite where the child is lifted off.
     tilt : float
         Largest tilt of the child out of its plane, to one side, in degrees.
     """
@@ -137,7 +137,10 @@ def contacts(plan: SinglePlan, angle: float) -> tuple[Floats, Floats, Floats]:
         # the other's surface lies outside the pin owner's: a motion against the normal closes it
         side = -1.0 if pin_owner == 0 else 1.0
         across, along = circled.normal
-        add(circle, circled.radius, circled.z, (side * across, side * along), circled.gap)
+        where = circle
+        if circled.arc != (0.0, 360.0):
+            where = np.radians(np.linspace(*circled.arc, 5))
+        add(where, circled.radius, circled.z, (side * across, side * along), circled.gap)
     grooves = [_groove_arc(mount, plan) for mount in spec.mounts]
     for knuckle in layout.knuckles:
         ends = (knuckle.start, knuckle.end)
@@ -257,7 +260,7 @@ def _single(plan: SinglePlan, angle: float) -> Play:
     for direction in (-1.0, 1.0):
         closing = direction * normals[:, 2]
         binding = closing > 1e-9
-        along.append(float(np.min(gaps[binding] / closing[binding])))
+        along.append(float(np.min(gaps[binding] / closing[binding], initial=np.inf)))
     directions = np.arange(0.0, 2.0 * pi, 4.0 * _STEP)
     tilts = [largest_tilt(points, normals, gaps, float(direction))[1] for direction in directions]
     return Play(max(shifts), min(shifts), (along[0], along[1]), degrees(max(tilts)))

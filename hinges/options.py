@@ -204,6 +204,10 @@ class DoubleHingeOptions(BarrelOptions):
             raise HingeError(f"plate is {self.plate:g} mm: give a length above 0")
         if self.bracket is not None and not isinstance(self.bracket, Bracket):
             raise HingeError(f"bracket is {self.bracket!r}: give Bracket(...)")
+        if self.bracket is not None and self.bracket.flat:
+            raise HingeError(
+                "bracket is flat: the barrels of a double hinge stand on two sides and lie on none"
+            )
 
 
 class MeshKeywords(TypedDict, total=False):

@@ -247,13 +247,18 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
             layout, widest, spec.chamfer, spec.angle, spec.angular_range
         )
     access = spec.pin.insertion_cuts(layout, 0.5 * spec.length)
+    travel = spec.pin.travel_cuts(layout, 0.5 * spec.length)
     barrels = spec.pin.knuckle_shapes(layout, spec.chamfer)
     roofs = spec.pin.bore_cuts(layout, spec.bore_form)
     halves = []
     for owner, (side, mount) in enumerate(zip((-1.0, 1.0), spec.mounts, strict=True)):
         halves.append(
             HalfPlan(
-                (groove(layout, owner, core), *access),
+                (
+                    groove(layout, owner, core),
+                    *access,
+                    *(shape for who, shape in travel if who == owner),
+                ),
                 (*mount.web(layout, spec.gap, side), *(lugs if owner else ())),
                 (*(shape for who, shape in barrels if who == owner), *(() if owner else bumps)),
                 (
