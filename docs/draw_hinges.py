@@ -18,6 +18,7 @@ from fabfold.export.camera import View
 from fabfold.export.render import Mesh, render
 from fabfold.files import write_bytes
 from hinges import (
+    Arm,
     Bracket,
     ConePin,
     Coupon,
@@ -25,6 +26,7 @@ from hinges import (
     DoubleHinge,
     FilamentPin,
     Leaf,
+    LiftPin,
     Magnet,
     MagnetPocket,
     RodPin,
@@ -138,6 +140,13 @@ def single_pictures() -> None:
                 "Bracket(gusset=True)",
                 picture(halves(SingleHinge(30, leaf=Bracket(gusset=True), **leaf))),
             ),
+            (
+                "Bracket(flat=True)",
+                picture(
+                    halves(SingleHinge(30, clearance=0.3, leaf=Bracket(flat=True))),
+                    replace(LYING, elevation_deg=-28.0),
+                ),
+            ),
             ("Leaf(14, 2)", picture(halves(SingleHinge(40, leaf=Leaf(14, 2), **leaf)))),
             (
                 "Leaf(..., holes=3, sink=6)",
@@ -171,6 +180,76 @@ def _straight(knuckles: int) -> SingleHinge:
     )
 
 
+def arm_pictures() -> None:
+    """Arms, a box with a lower lid, and a lid that opens by 270°."""
+
+    def draw(leaf: Any, **options: Any) -> Picture:
+        hinge = SingleHinge(30, clearance=0.3, leaf=leaf, **options)
+        return picture(_on_blocks(hinge), ALONG)
+
+    flat = {"angle": 90.0, "clear_top": True}
+    uneven = (Arm(offset=7, clear_top=True), Arm(height=6))
+    page(
+        "arms.png",
+        [
+            ("Arm()", draw(Arm())),
+            ("Arm(offset=7, fill=False)", draw(Arm(offset=7, fill=False))),
+            ("Arm(angle=90, clear_top=True)", draw(Arm(**flat))),
+            (
+                "round_top=1, round_bottom=4",
+                draw(Arm(offset=7, fill=False, round_top=1, round_bottom=4)),
+            ),
+            ("Arm(clip=4)", draw(Arm(clip=4))),
+            ("Arm(offset=2, root=3, angle=90, ...)", draw(Arm(offset=2, root=3, **flat))),
+            ("Arm.pair(14)", draw(Arm.pair(14))),
+            ("Arm.pair(14, fill=False, angle=60)", draw(Arm.pair(14, fill=False, angle=60))),
+            (
+                "(Arm(offset=7, ...), Arm(height=6))",
+                draw(uneven),
+            ),
+        ],
+    )
+    hinge = SingleHinge(60, knuckles=5, clearance=0.3, leaf=Arm.pair(26))
+    box, lid = hinge.fit(*_cases(hinge, 36, 10), check=False)
+    rows = []
+    view = replace(LYING, azimuth_deg=-60.0, elevation_deg=25.0)
+    for angle, words in ((0, "as printed"), (110, "at 110°"), (180, "closed")):
+        box.joints["hinge"].connect_to(lid.joints["hinge"], angle=angle)
+        rows.append((f"Arm.pair(26): {words}", picture([box, lid], view)))
+    hinge = SingleHinge(
+        60, clearance=0.3, leaf=(Arm(offset=4, **flat), Arm(**flat)), opens=270, closed=180
+    )
+    box, lid = hinge.fit(*_cases(hinge, 36, 3, wall=3), check=False)
+    for angle in (180, 0, -90):
+        box.joints["hinge"].connect_to(lid.joints["hinge"], angle=angle)
+        rows.append((f"opens=270, closed=180: at {angle}°", picture([box, lid], view)))
+    page("unequal.png", rows)
+
+
+def _on_blocks(hinge: SingleHinge) -> list[Any]:
+    """Both halves and the near ends of the bodies that they stand on."""
+    (aside, below), (other, other_below) = hinge.corners
+    made = hinge.fit(
+        Pos(-aside - 6, -below - 12) * Box(12, 24, 30),
+        Pos(other + 6, -other_below - 12) * Box(12, 24, 30),
+        check=False,
+    )
+    return list(made)
+
+
+def _cases(hinge: SingleHinge, box_high: float, lid_high: float, wall: float = 2.0) -> list[Any]:
+    """A box and a lid, hollow from above, where the arms of a hinge reach."""
+    made = []
+    for (aside, below), high, side in zip(
+        hinge.corners, (box_high, lid_high), (-1, 1), strict=True
+    ):
+        case = Pos(0, -high / 2) * Box(40, high, 60)
+        if high > wall:
+            case -= Pos(0, -high / 2 + wall) * Box(40 - 2 * wall, high, 60 - 2 * wall)
+        made.append(Pos(side * (aside + 20), -below) * case)
+    return made
+
+
 def pin_pictures() -> None:
     """Every pin, cut open, and the bores."""
     rows = []
@@ -194,6 +273,17 @@ def pin_pictures() -> None:
         hinge = SingleHinge(**{"length": 20, "clearance": 0.3, **options})
         rows.append((text, picture(cut(halves(hinge)), ACROSS)))
     page("pins.png", rows)
+    hinge = SingleHinge(24, knuckles=2, clearance=0.3, pin=LiftPin(1.5, at=90), angle=90)
+    near = replace(LYING, azimuth_deg=30.0, elevation_deg=40.0)
+    off = hinge.child_half.moved(Pos(0, 0, 14))
+    page(
+        "lift.png",
+        [
+            ("LiftPin(1.5, at=90), cut open", picture(cut(halves(hinge)), ACROSS)),
+            ("the tooth on the pin", picture([hinge.parent_half], near, y_up=False)),
+            ("lifted off at 90°", picture([hinge.parent_half, off], near, y_up=False)),
+        ],
+    )
     rows = []
     for bore in ("round", "teardrop", "octagon"):
         hinge = SingleHinge(24, clearance=0.3, pin=ScrewPin("M3"), bore=bore)
@@ -350,6 +440,7 @@ def example_pictures() -> None:
 def main() -> None:
     """Draw all of them."""
     single_pictures()
+    arm_pictures()
     pin_pictures()
     stop_pictures()
     double_pictures()

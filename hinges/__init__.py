@@ -18,6 +18,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     # For editors and type checkers; when it runs, names are imported on first use.
+    from .arm import Arm as Arm
     from .ball_socket import BallSocket as BallSocket
     from .clearance import Clearance as Clearance
     from .coupon_files import write_coupon as write_coupon
@@ -30,12 +31,14 @@ if TYPE_CHECKING:
     from .exceptions import KernelError as KernelError
     from .hardware import FilamentPin as FilamentPin
     from .hardware import RodPin as RodPin
+    from .hardware import Screw as Screw
     from .hardware import ScrewPin as ScrewPin
     from .joint_play import Play as Play
     from .joint_play import play as play
     from .joint_play import total_play as total_play
     from .leaf import Bracket as Bracket
     from .leaf import Leaf as Leaf
+    from .lift_pin import LiftPin as LiftPin
     from .living_hinge import LivingHinge as LivingHinge
     from .print_files import write_3mf as write_3mf
     from .print_files import write_step as write_step
@@ -55,6 +58,7 @@ if TYPE_CHECKING:
 
 #: The module that each public name lives in.
 _HOMES = {
+    "Arm": "arm",
     "BallSocket": "ball_socket",
     "Bracket": "leaf",
     "Clearance": "clearance",
@@ -71,11 +75,13 @@ _HOMES = {
     "HingeHalf": "single",
     "KernelError": "exceptions",
     "Leaf": "leaf",
+    "LiftPin": "lift_pin",
     "LivingHinge": "living_hinge",
     "Magnet": "retention",
     "MagnetPocket": "retention",
     "Play": "joint_play",
     "RodPin": "hardware",
+    "Screw": "hardware",
     "ScrewPin": "hardware",
     "SingleHinge": "single",
     "SnapDimple": "retention",

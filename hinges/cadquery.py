@@ -253,12 +253,12 @@ def _fitted(
             raise HingeError("give the length: only an edge on the stack tells it")
         length = edges[0].Length()
     half, carve = _half_and_carve(side, length, options)
-    gap = _single(length, options).spec.gap
+    corner = _single(length, options).corners[0 if side == "parent" else 1]
     cutters, added = _pieces(carve), _pieces(half)
     body = self.findSolid()
     before = len(body.Solids())
     if edges:
-        places = [edge_place(body, edge, side, outwards, gap) for edge in edges]
+        places = [edge_place(body, edge, side, outwards, corner) for edge in edges]
     else:
         # Each point of the stack, in global coordinates, as a place for the hinge.
         places = [
@@ -274,7 +274,7 @@ def _fitted(
     if len(body.Solids()) != before:
         raise HingeError(
             f"the {side} body came out in {len(body.Solids())} pieces instead of {before}: it must "
-            "reach the bracket of its half, and the carve must not cut it in two"
+            "reach the bracket or arm of its half, and the carve must not cut it in two"
         )
     solids = body.Solids()
     # The line of each axis, for constraints of an assembly; both halves have it the same way round.

@@ -62,9 +62,13 @@ def from_cadquery(shape: Any) -> Any:
 
 
 def edge_place(
-    body: Any, edge: cq.Edge, side: str, outwards: tuple[float, float, float] | None, gap: float
+    body: Any,
+    edge: cq.Edge,
+    side: str,
+    outwards: tuple[float, float, float] | None,
+    corner: tuple[float, float],
 ) -> cq.Location:
-    """Lay a hinge on an edge of a body, half a gap off both of its faces.
+    """Lay a hinge on an edge of a body, half a gap off both of its faces or as its arm reaches.
 
     Parameters
     ----------
@@ -76,8 +80,8 @@ def edge_place(
         Which of the two bodies it is.
     outwards : (float, float, float) or None
         Direction out of both bodies.
-    gap : float
-        Distance between the two bodies in mm.
+    corner : (float, float)
+        How far the edge lies aside of the axis and below it, in mm.
 
     Returns
     -------
@@ -108,7 +112,7 @@ def edge_place(
             f"no face at the edge looks in the direction {tuple(outwards)}, or the two are not "
             "square to one another"
         )
-    origin = line.position_at(0.5) + (outer + inner) * (0.5 * gap)
+    origin = line.position_at(0.5) + inner * corner[0] + outer * corner[1]
     across = inner if side == "parent" else -inner
     return cq.Location(
         cq.Plane(tuple(origin), xDir=tuple(across), normal=tuple(across.cross(outer)))

@@ -23,6 +23,8 @@ __all__ = ["edge_frame", "faces_at", "hinge_location"]
 
 #: How far an edge may lie off an edge of its body, in mm.
 _NEAR = 1e-3
+#: How far bodies may lie off what their arms reach, in mm.
+_OFF = 0.01
 
 
 def hinge_location(origin: VectorLike, along: VectorLike, outwards: VectorLike) -> Location:
@@ -92,7 +94,13 @@ def faces_at(body: Part | Solid, edge: Edge) -> list[Vector]:
     return normals
 
 
-def edge_frame(parent: Any, child: Any, edge: Edge, gap: float) -> Location:
+def edge_frame(
+    parent: Any,
+    child: Any,
+    edge: Edge,
+    gap: float,
+    corners: tuple[tuple[float, float], tuple[float, float]] | None = None,
+) -> Location:
     """Lay a hinge on an edge of one body, beside the other.
 
     Parameters
@@ -103,6 +111,9 @@ def edge_frame(parent: Any, child: Any, edge: Edge, gap: float) -> Location:
         The straight edge of either at which they shall turn.
     gap : float
         Distance between the bodies in mm, for the outer faces: half of it from the edge.
+    corners : ((float, float), (float, float)), optional
+        For an axis on arms: how far aside of the axis and below it the edges of parent and child
+        lie, in mm.
 
     Returns
     -------
@@ -113,7 +124,7 @@ def edge_frame(parent: Any, child: Any, edge: Edge, gap: float) -> Location:
     ------
     HingeError
         If it is no edge of either body, its faces are not square to one another, or the other body
-        does not lie beside it.
+        does not lie beside it, or not where its arms reach.
     """
     bodies = [body.part if isinstance(body, BuildPart) else body for body in (parent, child)]
     middle = edge.position_at(0.5)
@@ -138,6 +149,34 @@ def edge_frame(parent: Any, child: Any, edge: Edge, gap: float) -> Location:
             f"the bodies overlap by {-between:.3g} mm beside the edge: leave a gap of {gap:g} mm "
             "between them"
         )
+    if corners is not None:
+        aside, below = corners[own]
+        _require_reach(box.max.Y, between, corners, own)
+        origin = middle + towards * aside + outwards * below
+        return Plane(origin=origin, x_dir=x_dir, z_dir=x_dir.cross(outwards)).location
     shift = 0.5 * between if between < 4.0 * gap else 0.5 * gap
     origin = middle + towards * shift + outwards * (0.5 * gap)
     return Plane(origin=origin, x_dir=x_dir, z_dir=x_dir.cross(outwards)).location
+
+
+def _require_reach(
+    top: float, between: float, corners: tuple[tuple[float, float], tuple[float, float]], own: int
+) -> None:
+    """Refuse bodies that do not lie as their arms hold them.
+
+    `top` is how far the other body's top lies above that of the body with the edge, `between` how
+    far apart their walls are, in mm.
+    """
+    apart = corners[0][0] + corners[1][0]
+    higher = corners[own][1] - corners[1 - own][1]
+    if abs(between - apart) > _OFF:
+        raise HingeError(
+            f"the walls of the bodies are {between:.4g} mm apart and their arms hold them "
+            f"{apart:.4g} mm apart: move one, or give the arms offsets that add up to {between:.4g}"
+        )
+    if abs(top - higher) > _OFF:
+        step = top if own == 1 else -top
+        raise HingeError(
+            f"the top of the {('child', 'parent')[own]} lies {top:.4g} mm above that of the other "
+            f"body and the arms hold it {higher:.4g} mm above: give leaf=Arm.pair({step:.4g})"
+        )

@@ -10,6 +10,7 @@ rule            what it asks for
 ``cone``        a cone that stays in its recess by 0.2 mm after its axial play
 ``retention``   the child cannot leave along the axis
 ``bracket``     material of the bracket behind the groove of the other half's knuckles
+``arm``         an arm that carries its knuckles, below the top of its body and clear of the other
 ``chamfer``     barrel ends that keep a flat after their chamfer
 ``range``       the turn stays between the two brackets
 ``pose``        the pose that is drawn keeps the clearance to the stops and sits at a detent
@@ -37,6 +38,7 @@ RULES: Final[tuple[str, ...]] = (
     "cone",
     "retention",
     "bracket",
+    "arm",
     "chamfer",
     "range",
     "pose",

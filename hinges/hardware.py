@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, radians
 from typing import Final, Literal
 
-from .clearance import Clearance
+from .clearance import Clearance, number
 from .exceptions import HingeError
-from .fit import at_least
+from .fit import at_least, at_most
 from .knuckles import KnuckleLayout
 from .pins import BoreForm, ContactCircle, OwnedShape, Pin, turned_knuckle
 from .shapes import Point, Shape, Turned, cylinder, regular
@@ -264,27 +264,36 @@ class ScrewPin(Pin):
 
     Parameters
     ----------
-    size : str
+    size : str or Screw
         Its thread, a name of :data:`SCREWS`: M1.6 to M5, #2-56 to #10-24 and 1/4-20; "#6" is
-        "#6-32".
+        "#6-32". The sizes of any other as a :class:`Screw`.
     head : {"cylinder", "countersunk"}
         Form of its head.
     end : {"nut", "tap"}
         What holds it: a nut, or the thread that the screw cuts itself in the last knuckle.
     sunk : bool
         Whether head and nut lie in pockets of the barrel; otherwise they stand outside its ends.
+    thread : float, optional
+        Length in mm of the thread that the screw cuts at the far end of the last knuckle; before
+        it the bore is wide. The whole knuckle when left out.
     """
 
-    size: str = "M3"
+    size: str | Screw = "M3"
     head: Literal["cylinder", "countersunk"] = "cylinder"
     end: Literal["nut", "tap"] = "tap"
     sunk: bool = False
+    thread: float | None = None
 
     _ROOM = 0.15
 
     def __post_init__(self) -> None:
         """Refuse unknown sizes and forms."""
-        _screw(self.size)
+        _ = self.screw
+        if self.thread is not None:
+            if number(self.thread, "a screw's thread") <= 0.0:
+                raise HingeError(f"screw pin: thread is {self.thread:g} mm: give a length above 0")
+            if self.end != "tap":
+                raise HingeError('screw pin: a nut holds the screw; give thread with end="tap"')
         if self.head not in ("cylinder", "countersunk") or self.end not in ("nut", "tap"):
             raise HingeError(
                 f"screw pin: head {self.head!r} must be cylinder or countersunk and end "
@@ -296,7 +305,11 @@ class ScrewPin(Pin):
     @property
     def screw(self) -> Screw:
         """The sizes of the screw."""
-        return _screw(self.size)
+        return self.size if isinstance(self.size, Screw) else _screw(self.size)
+
+    def _thread(self, layout: KnuckleLayout) -> float:
+        """Length of the thread in the last knuckle in mm."""
+        return layout.knuckles[-1].length if self.thread is None else self.thread
 
     @property
     def _nut_radius(self) -> float:
@@ -342,10 +355,19 @@ class ScrewPin(Pin):
         if self.end == "tap":
             at_least(
                 "knuckle",
-                f"the length of thread in the last knuckle for {self.size}",
-                layout.knuckles[-1].length,
+                f"the length of thread in the last knuckle for {self.screw.name}",
+                self._thread(layout),
                 1.5 * self.screw.diameter,
-                "use fewer knuckles, a longer edge, or a nut",
+                "use fewer knuckles, a longer edge, or a nut"
+                if self.thread is None
+                else "use a longer thread, or a nut",
+            )
+            at_most(
+                "knuckle",
+                "the length of thread in the last knuckle",
+                self._thread(layout),
+                layout.knuckles[-1].length,
+                "use a shorter thread, or leave it out for the whole knuckle",
             )
 
     def _head_depth(self) -> float:
@@ -369,6 +391,9 @@ class ScrewPin(Pin):
                 if self.head == "countersunk":
                     wide = 0.5 * self.screw.sunk + self._ROOM
                     start = [(bore, knuckle.start + wide - bore), (wide, knuckle.start)]
+            if bore < clear and self._thread(layout) < knuckle.length - 1e-9:
+                foot = knuckle.end - self._thread(layout)
+                start = [(bore, foot), (clear, foot), (clear, knuckle.start)]
             made.append(
                 (
                     knuckle.owner,
@@ -382,10 +407,12 @@ class ScrewPin(Pin):
         made: list[OwnedShape] = []
         last = len(layout.knuckles) - 1
         for index, knuckle in enumerate(layout.knuckles):
-            if index < last or self.end == "nut":
+            wide = knuckle
+            if index == last and self.end == "tap":
+                wide = replace(knuckle, end=knuckle.end - self._thread(layout))
+            if wide.length > 1e-9:
                 made += [
-                    (knuckle.owner, over)
-                    for over in bore_form.roof(0.5 * self.screw.clear, knuckle)
+                    (knuckle.owner, over) for over in bore_form.roof(0.5 * self.screw.clear, wide)
                 ]
         if self.sunk and self.end == "nut":
             knuckle = layout.knuckles[-1]
@@ -428,7 +455,7 @@ class ScrewPin(Pin):
         radius = 0.5 * screw.diameter
         base = layout.start
         # Where the screw cuts its own thread only its core is drawn.
-        thread = layout.knuckles[-1].start
+        thread = layout.end - self._thread(layout)
         core = 0.5 * screw.tap if self.end == "tap" else radius
         shank: tuple[Point, ...] = ((radius, thread), (core, thread)) if core < radius else ()
         shank = (*shank, (core, layout.end), (0.0, layout.end))

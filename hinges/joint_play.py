@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .arm import Mount
 from .exceptions import HingeError
 from .plan_single import SinglePlan, SingleSpec, plan_single
 from .shapes import HalfPlan
@@ -42,7 +43,7 @@ class Play:
     radial_least : float
         The same in the direction that allows least.
     axial : (float, float)
-        Largest shift along -z and +z in mm.
+        Largest shift along -z and +z in mm; infinite where the child is lifted off.
     tilt : float
         Largest tilt of the child out of its plane, to one side, in degrees.
     """
@@ -136,22 +137,19 @@ def contacts(plan: SinglePlan, angle: float) -> tuple[Floats, Floats, Floats]:
         # the other's surface lies outside the pin owner's: a motion against the normal closes it
         side = -1.0 if pin_owner == 0 else 1.0
         across, along = circled.normal
-        add(circle, circled.radius, circled.z, (side * across, side * along), circled.gap)
-    _, far, top, bottom = spec.leaf.limits(layout, spec.gap)
-    reach = layout.groove_radius
-    low = -asin(min(1.0, bottom / reach))
-    if far > 0.0:
-        low = max(low, -acos(min(1.0, 0.5 * spec.gap / reach)))
-    high = -asin(min(1.0, top / reach))
-    count = max(2, int((high - low) / _STEP) + 1)
-    arc = np.linspace(low, high, count)
+        where = circle
+        if circled.arc != (0.0, 360.0):
+            where = np.radians(np.linspace(*circled.arc, 5))
+        add(where, circled.radius, circled.z, (side * across, side * along), circled.gap)
+    grooves = [_groove_arc(mount, plan) for mount in spec.mounts]
     for knuckle in layout.knuckles:
         ends = (knuckle.start, knuckle.end)
         for z in ends:
             if knuckle.owner == 0:  # the parent's barrel in the child's groove
-                add(arc + np.radians(angle), layout.radius, z, (-1.0, 0.0), spec.clearance.radial)
+                where = grooves[1] + np.radians(angle)
+                add(where, layout.radius, z, (-1.0, 0.0), spec.clearance.radial)
             else:  # the child's barrel in the parent's
-                add(pi - arc, layout.radius, z, (1.0, 0.0), spec.clearance.radial)
+                add(pi - grooves[0], layout.radius, z, (1.0, 0.0), spec.clearance.radial)
     rims = (layout.radius - spec.chamfer, spec.pin.largest_radius(layout, spec.bore_form))
     for one, after in zip(layout.knuckles, layout.knuckles[1:], strict=False):
         direction = -1.0 if one.owner == 0 else 1.0
@@ -164,6 +162,17 @@ def contacts(plan: SinglePlan, angle: float) -> tuple[Floats, Floats, Floats]:
                 layout.clearance.axial,
             )
     return np.concatenate(points), np.concatenate(normals), np.concatenate(gaps)
+
+
+def _groove_arc(mount: Mount, plan: SinglePlan) -> Floats:
+    """Directions, in radians, in which a body has a groove; none where an arm keeps it away."""
+    near, _, top, bottom = mount.limits(plan.layout, plan.spec.gap)
+    reach = plan.layout.groove_radius
+    if near >= reach or top >= reach:
+        return np.empty(0)
+    low = max(-asin(min(1.0, bottom / reach)), -acos(near / reach))
+    high = -asin(max(-1.0, top / reach))
+    return np.linspace(low, high, max(2, int((high - low) / _STEP) + 1))
 
 
 def play(
@@ -251,7 +260,7 @@ def _single(plan: SinglePlan, angle: float) -> Play:
     for direction in (-1.0, 1.0):
         closing = direction * normals[:, 2]
         binding = closing > 1e-9
-        along.append(float(np.min(gaps[binding] / closing[binding])))
+        along.append(float(np.min(gaps[binding] / closing[binding], initial=np.inf)))
     directions = np.arange(0.0, 2.0 * pi, 4.0 * _STEP)
     tilts = [largest_tilt(points, normals, gaps, float(direction))[1] for direction in directions]
     return Play(max(shifts), min(shifts), (along[0], along[1]), degrees(max(tilts)))

@@ -9,7 +9,43 @@ from .fit import at_least
 from .knuckles import KnuckleLayout
 from .shapes import Moved, Prism, Shape, Turned, box
 
-__all__ = ["Bracket", "Leaf"]
+__all__ = ["Bracket", "Leaf", "flat_foot", "flat_level"]
+
+
+def flat_level(layout: KnuckleLayout) -> float:
+    """How far below the axis a barrel begins to overhang by less than 45°, in mm.
+
+    Parameters
+    ----------
+    layout : KnuckleLayout
+        The knuckles of the axis.
+
+    Returns
+    -------
+    float
+        Distance in mm.
+    """
+    return float(layout.radius * 0.5**0.5)
+
+
+def flat_foot(layout: KnuckleLayout, bottom: float) -> tuple[Shape, ...]:
+    """Plan what is cut from barrels that lie on the bed.
+
+    Parameters
+    ----------
+    layout : KnuckleLayout
+        The knuckles of the axis.
+    bottom : float
+        How far below the axis the lower face of what they stand on lies, in mm.
+
+    Returns
+    -------
+    tuple of Shape
+        What lies below the flat foot.
+    """
+    level, wide = max(bottom, flat_level(layout)), 1.1 * layout.radius
+    deep = max(level, layout.radius) + 1.0
+    return (box(-wide, wide, -deep, -level, layout.start - 1.0, layout.end + 1.0),)
 
 
 @dataclass(frozen=True)
@@ -26,11 +62,21 @@ class Bracket:
     gusset : bool
         Whether the bar's lower side slopes at 45° down to the shared face, so that it prints
         without support inside a wall thinner than itself, in a body that stands with y up.
+    flat : bool
+        Whether the barrels are cut flat below, where they would overhang by more than 45°, for
+        plates that print lying. Without `depth` the bar ends in that plane, 0.71 radii below the
+        axis: the lower face of plates that thick.
     """
 
     width: float | None = None
     depth: float | None = None
     gusset: bool = False
+    flat: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse a slope below a flat foot."""
+        if self.flat and self.gusset:
+            raise HingeError("bracket: a flat one lies on the bed and has no gusset: give one")
 
     def limits(self, layout: KnuckleLayout, gap: float) -> tuple[float, float, float, float]:
         """Find where the web lies.
@@ -49,7 +95,9 @@ class Bracket:
             and lower face along it.
         """
         width = layout.groove_radius + 1.2 if self.width is None else self.width
-        depth = width if self.depth is None else self.depth
+        depth = self.depth
+        if depth is None:
+            depth = flat_level(layout) if self.flat else width
         return 0.5 * gap, width, 0.5 * gap, depth
 
     def check(self, layout: KnuckleLayout, gap: float, wall: float) -> None:
@@ -69,14 +117,23 @@ class Bracket:
         FitError
             If less than a wall of it stays behind the groove, either way.
         """
-        _, width, _, depth = self.limits(layout, gap)
+        _, width, top, depth = self.limits(layout, gap)
+        behind = width if self.flat else min(width, depth)
         at_least(
             "bracket",
             "the bracket's material behind the groove",
-            min(width, depth) - layout.groove_radius,
+            behind - layout.groove_radius,
             wall,
             "use a wider and deeper bracket or a smaller barrel",
         )
+        if self.flat:
+            at_least(
+                "bracket",
+                "the thickness of a flat bracket",
+                depth - top,
+                wall,
+                "use a deeper bracket, a wider barrel or a smaller gap",
+            )
 
     def web(self, layout: KnuckleLayout, gap: float, side: float) -> tuple[Shape, ...]:
         """Draw the bar of one half.
@@ -120,10 +177,10 @@ class Bracket:
         Returns
         -------
         tuple of Shape
-            Nothing for a bracket.
+            What lies below a flat foot; otherwise nothing.
         """
-        del layout, gap, side
-        return ()
+        del side
+        return flat_foot(layout, self.limits(layout, gap)[3]) if self.flat else ()
 
 
 @dataclass(frozen=True)
@@ -160,7 +217,7 @@ class Leaf:
 
     def limits(self, layout: KnuckleLayout, gap: float) -> tuple[float, float, float, float]:
         """Find where the plate lies, as :meth:`Bracket.limits` does."""
-        level = layout.radius * (0.5**0.5 if self.flat else 1.0)
+        level = flat_level(layout) if self.flat else layout.radius
         top = max(0.5 * gap, level - self.thickness) if self.offset is None else self.offset
         return 0.5 * gap, self.width, top, top + self.thickness
 
@@ -244,11 +301,7 @@ class Leaf:
     def hole_cuts(self, layout: KnuckleLayout, gap: float, side: float) -> tuple[Shape, ...]:
         """Plan the screw holes, drilled from the upper face, and what lies below a flat foot."""
         _, far, top, bottom = self.limits(layout, gap)
-        foot: tuple[Shape, ...] = ()
-        if self.flat:
-            level, wide = max(bottom, layout.radius * 0.5**0.5), 1.1 * layout.radius
-            deep = max(level, layout.radius) + 1.0
-            foot = (box(-wide, wide, -deep, -level, layout.start - 1.0, layout.end + 1.0),)
+        foot = flat_foot(layout, bottom) if self.flat else ()
         middle = 0.5 * side * (layout.groove_radius + far)
         radius, over = 0.5 * self.hole, 0.01
         deep = bottom - top + over

@@ -7,9 +7,10 @@ from typing import Any
 
 from build123d import BuildPart, Location, Part, Plane, Solid
 
+from .arm import Arm, Mount
 from .exact_solids import build_shape, solids_of
 from .exceptions import HingeError
-from .leaf import Bracket, Leaf
+from .leaf import Leaf
 from .placement import HingedPart, keep_joints
 from .shapes import box, cylinder
 
@@ -70,7 +71,7 @@ def one_body(body: Any, name: str) -> Part | Solid:
 
 
 def require_edge(
-    body: Part | Solid, name: str, frame: Location, ends: tuple[float, float], leaf: Bracket | Leaf
+    body: Part | Solid, name: str, frame: Location, ends: tuple[float, float], leaf: Mount
 ) -> None:
     """Refuse a hinge that is longer than its body.
 
@@ -84,7 +85,7 @@ def require_edge(
         The hinge's frame.
     ends : (float, float)
         First and last z of the knuckles, in mm.
-    leaf : Bracket or Leaf
+    leaf : Bracket, Leaf or Arm
         What joins the knuckles; a leaf carries them without the body.
 
     Raises
@@ -112,7 +113,7 @@ def let_in(
     carve: Part,
     frame: Location,
     barrel: float,
-    leaf: Bracket | Leaf,
+    leaf: Mount,
 ) -> HingedPart:
     """Cut and add: ``body - carve + half``, with what would stand out of the body trimmed.
 
@@ -131,8 +132,9 @@ def let_in(
         The hinge's frame as it lies on the body, its axis along z.
     barrel : float
         Radius in mm about the axis that belongs to the hinge.
-    leaf : Bracket or Leaf
-        What joins the knuckles; a bracket lies in its body and nowhere else.
+    leaf : Bracket, Leaf or Arm
+        What joins the knuckles; a bracket lies in its body and nowhere else, an arm does not reach
+        below it.
 
     Returns
     -------
@@ -145,14 +147,15 @@ def let_in(
         If it does not come out in one piece.
     """
     added = half.solids()
-    if isinstance(leaf, Bracket):
-        added = _trimmed(added, body, frame, barrel)
+    if not isinstance(leaf, Leaf):
+        added = _trimmed(added, body, frame, barrel, outside=isinstance(leaf, Arm))
     solids = solids_of(solids_of(body)[0].cut(*carve.solids()))
     fitted = HingedPart(solids_of(solids[0].fuse(*solids[1:], *added)))
     if len(fitted.solids()) != 1:
         raise HingeError(
             f"the {name} body came out in {len(fitted.solids())} pieces: it must reach the "
-            "bracket of its half, and the carve must not cut it in two"
+            f"{'arm' if isinstance(leaf, Arm) else 'bracket'} of its half, and the carve must not "
+            f"cut it in two{_where(body, frame) if isinstance(leaf, Arm) else ''}"
         )
     fitted.label = body.label or name
     fitted.color = body.color
@@ -161,17 +164,33 @@ def let_in(
 
 
 def _trimmed(
-    added: Sequence[Solid], body: Part | Solid, frame: Location, barrel: float
+    added: Sequence[Solid],
+    body: Part | Solid,
+    frame: Location,
+    barrel: float,
+    *,
+    outside: bool,
 ) -> list[Solid]:
-    """The solids of a half without what of its bracket stands out of the body's bounds."""
+    """The solids of a half without what stands out of the body's bounds; of arms, below it only."""
     bounds = body.moved(frame.inverse()).bounding_box()
     length = 2.0 * max(solid.bounding_box().diagonal for solid in added)
-    room = build_shape(
-        box(bounds.min.X, bounds.max.X, bounds.min.Y, bounds.max.Y, bounds.min.Z, bounds.max.Z)
-    )
+    limits = [bounds.min.X, bounds.max.X, bounds.min.Y, bounds.max.Y, bounds.min.Z, bounds.max.Z]
+    if outside:
+        limits = [-length, length, bounds.min.Y, length, -length, length]
+    room = build_shape(box(*limits))
     own = [room.moved(frame), build_shape(cylinder(barrel, -length, length)).moved(frame)]
     kept: list[Solid] = []
     for solid in added:
         stray = [piece for piece in solids_of(solid.cut(*own)) if piece.volume > _SLIVER]
         kept += solids_of(solid.cut(*stray)) if stray else [solid]
     return kept
+
+
+def _where(body: Part | Solid, frame: Location) -> str:
+    """Where a body lies about the axis, for a message."""
+    bounds = body.moved(frame.inverse()).bounding_box()
+    aside = min(bounds.max.X, -bounds.min.X, key=abs)
+    return (
+        f"; its wall lies {abs(aside):.3g} mm beside the axis (offset) and its top "
+        f"{-bounds.max.Y:.3g} mm below it (rise and half the gap)"
+    )

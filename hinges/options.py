@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypedDict
 
+from .arm import Arm, Mount
 from .clearance import Clearance, number
 from .exceptions import HingeError
 from .hardware import LoosePin
@@ -95,7 +96,7 @@ class SingleHingeKeywords(BarrelKeywords, total=False):
 
     knuckles: int
     ratio: float
-    leaf: Bracket | Leaf | None
+    leaf: Mount | tuple[Mount, Mount] | None
     angle: float
     angular_range: tuple[float, float]
     opens: float | None
@@ -111,7 +112,7 @@ class SingleHingeOptions(BarrelOptions):
 
     knuckles: int = 3
     ratio: float = 1.0
-    leaf: Bracket | Leaf | None = None
+    leaf: Mount | tuple[Mount, Mount] | None = None
     angle: float = 0.0
     angular_range: tuple[float, float] = (0.0, 180.0)
     opens: float | None = None
@@ -134,8 +135,8 @@ class SingleHingeOptions(BarrelOptions):
         if number(self.closed, "closed") not in (0.0, 180.0):
             raise HingeError(f"closed is {self.closed:g}: give 0 or 180")
         if self.opens is not None:
-            if not 0.0 < number(self.opens, "opens") <= 180.0:
-                raise HingeError(f"opens is {self.opens:g}: give an angle above 0 and up to 180")
+            if not 0.0 < number(self.opens, "opens") <= 270.0:
+                raise HingeError(f"opens is {self.opens:g}: give an angle above 0 and up to 270")
             if self.stops is not None or tuple(self.angular_range) != (0.0, 180.0):
                 raise HingeError("opens stands for angular_range and stops: leave those out")
         if self.stops is not None and not isinstance(self.stops, (Stops, bool)):
@@ -149,8 +150,25 @@ class SingleHingeOptions(BarrelOptions):
             raise HingeError(f"friction is {self.friction:g} mm: give an interference above 0")
         if self.friction is not None and self.detents is not None:
             raise HingeError("friction and detents share their bumps: give one of them")
-        if self.leaf is not None and not isinstance(self.leaf, (Bracket, Leaf)):
-            raise HingeError(f"leaf is {self.leaf!r}: give Bracket(...) or Leaf(...)")
+        for mount in self.mounts:
+            if not isinstance(mount, (Bracket, Leaf, Arm)):
+                raise HingeError(
+                    f"leaf is {self.leaf!r}: give Bracket(...), Leaf(...) or Arm(...), or a pair "
+                    "of them for parent and child"
+                )
+        if (self.opens or 0.0) > 180.0 and self.closed != 180.0:
+            raise HingeError(
+                f"opens is {self.opens:g}: beyond 180° the child turns below 0°, down along the "
+                "wall of its parent; draw it so and give closed=180"
+            )
+
+    @property
+    def mounts(self) -> tuple[Mount, Mount]:
+        """What joins the knuckles of parent and child to their bodies."""
+        if isinstance(self.leaf, (tuple, list)) and len(self.leaf) == 2:
+            return self.leaf[0], self.leaf[1]
+        mount = Bracket() if self.leaf is None else self.leaf
+        return mount, mount  # type: ignore[return-value]
 
 
 class DoubleHingeKeywords(BarrelKeywords, total=False):
@@ -186,6 +204,10 @@ class DoubleHingeOptions(BarrelOptions):
             raise HingeError(f"plate is {self.plate:g} mm: give a length above 0")
         if self.bracket is not None and not isinstance(self.bracket, Bracket):
             raise HingeError(f"bracket is {self.bracket!r}: give Bracket(...)")
+        if self.bracket is not None and self.bracket.flat:
+            raise HingeError(
+                "bracket is flat: the barrels of a double hinge stand on two sides and lie on none"
+            )
 
 
 class MeshKeywords(TypedDict, total=False):

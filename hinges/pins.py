@@ -87,12 +87,15 @@ class ContactCircle:
         Outward unit normal of the pin's surface there.
     gap : float
         Distance to the facing surface in mm.
+    arc : (float, float)
+        First and last direction of the circle's part that faces anything, in degrees from +x.
     """
 
     z: float
     radius: float
     normal: tuple[float, float]
     gap: float
+    arc: tuple[float, float] = (0.0, 360.0)
 
 
 class Pin(ABC):
@@ -255,6 +258,24 @@ class Pin(ABC):
         -------
         tuple of Shape
             What to cut from both bodies.
+        """
+        del layout, edge
+        return ()
+
+    def travel_cuts(self, layout: KnuckleLayout, edge: float) -> tuple[OwnedShape, ...]:
+        """Plan what each body gives up so that the child can be moved along the axis.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+        edge : float
+            Half the length of the edge in mm.
+
+        Returns
+        -------
+        tuple of (int, Shape)
+            Number of the body and shape of each cut; empty for a pin that holds it.
         """
         del layout, edge
         return ()

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Unpack
 
+from .arm import Arm, Mount
+from .arm_room import check_arms
 from .barrel import BarrelSpec, barrel_spec, check_gap
 from .clearance import millimetres
 from .exceptions import FitError, HingeError
 from .fit import at_least, at_most
 from .knuckles import KnuckleLayout, groove, lay_out_knuckles
-from .leaf import Bracket, Leaf
+from .leaf import Bracket
 from .options import SingleHingeKeywords, SingleHingeOptions
 from .shapes import HalfPlan, Shape
 from .stops import Detents, Stops
@@ -30,8 +32,8 @@ class SingleSpec(BarrelSpec):
     ----------
     length : float
         Length in mm of the edge that the hinge is for.
-    leaf : Bracket or Leaf
-        What joins the knuckles of a half.
+    mounts : (Mount, Mount)
+        What joins the knuckles of the parent and of the child to their bodies.
     angle : float
         Angle in degrees at which the hinge is drawn and printed.
     angular_range : (float, float)
@@ -45,12 +47,22 @@ class SingleSpec(BarrelSpec):
     """
 
     length: float
-    leaf: Bracket | Leaf
+    mounts: tuple[Mount, Mount]
     angle: float
     angular_range: tuple[float, float]
     stops: Stops | None
     detents: Detents | None
     ratio: float = 1.0
+
+    @property
+    def leaf(self) -> Mount:
+        """What joins the knuckles of the parent."""
+        return self.mounts[0]
+
+    @property
+    def on_arms(self) -> bool:
+        """Whether either half stands on arms."""
+        return any(isinstance(mount, Arm) for mount in self.mounts)
 
     @classmethod
     def read(cls, length: float | str, **keywords: Unpack[SingleHingeKeywords]) -> SingleSpec:
@@ -76,12 +88,14 @@ class SingleSpec(BarrelSpec):
         options = SingleHingeOptions(**keywords)
         length = millimetres(length, "length")
         sizes = dict(vars(barrel_spec(options, length, options.knuckles, (0.0, options.angle))))
-        if options.margin is None and isinstance(options.leaf, Leaf):
+        if options.margin is None and not any(
+            isinstance(mount, Bracket) for mount in options.mounts
+        ):
             sizes["margin"] = 0.0
         low, high, stops = _range(options)
         return cls(
             length=float(length),
-            leaf=Bracket() if options.leaf is None else options.leaf,
+            mounts=options.mounts,
             angle=float(options.angle),
             angular_range=(float(low), float(high)),
             stops=stops,
@@ -92,13 +106,14 @@ class SingleSpec(BarrelSpec):
 
 
 def _range(options: SingleHingeOptions) -> tuple[float, float, Stops | None]:
-    """Lowest and highest angle, and the stops there."""
+    """Lowest and highest angle, and the stops there; arms have nothing that a stop leans on."""
     if options.opens is None:
         stops = Stops() if options.stops is True else options.stops or None
         return (*options.angular_range, stops)
+    bare = any(isinstance(mount, Arm) for mount in options.mounts)
     if options.closed == 0.0:
-        return 0.0, options.opens, Stops()
-    return 180.0 - options.opens, 180.0, Stops(lower=True, upper=False)
+        return 0.0, options.opens, None if bare else Stops()
+    return 180.0 - options.opens, 180.0, None if bare else Stops(lower=True, upper=False)
 
 
 def _detents(options: SingleHingeOptions) -> Detents | None:
@@ -137,7 +152,13 @@ class SinglePlan:
 def _check_turn(spec: SingleSpec, layout: KnuckleLayout) -> None:
     low, high = spec.angular_range
     advice = "the child's quadrant lies beside the parent's at 0° and on it at 180°"
-    at_least("range", "the low end of the range", low, 0.0, advice, "°")
+    outside = all(isinstance(mount, Arm) for mount in spec.mounts)
+    below = (
+        "lower the child meets the wall of its parent"
+        if outside
+        else f"{advice}; below 0° it turns on an axis outside of both bodies, on leaf=Arm(...)"
+    )
+    at_least("range", "the low end of the range", low, -90.0 if outside else 0.0, below, "°")
     at_most("range", "the high end of the range", high, 180.0, advice, "°")
     at_least("range", "the turn", high - low, 1.0, "give (low, high) in degrees", "°")
     inside = "draw the hinge inside its range, and off its stops"
@@ -187,8 +208,16 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
         raise HingeError(f"gap {spec.gap:g} mm must be above 0 and at most the barrel's thickness")
     check_gap(spec)
     spec.pin.check(layout, spec.wall, spec.bore_form)
-    spec.leaf.check(layout, spec.gap, spec.wall)
+    for mount in spec.mounts:
+        mount.check(layout, spec.gap, spec.wall)
     _check_turn(spec, layout)
+    if spec.on_arms:
+        if spec.stops:
+            raise HingeError(
+                "stops lean on the faces of brackets and leaves, arms have none: leave stops out, "
+                "or give leaf=Bracket(...)"
+            )
+        check_arms(spec.mounts, layout, spec.gap, spec.angular_range)
     widest = spec.pin.largest_radius(layout, spec.bore_form)
     if spec.chamfer < 0.0:
         raise HingeError(f"chamfer {spec.chamfer:g} mm must not be negative")
@@ -200,9 +229,9 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
         "use a smaller chamfer, a thinner pin or a wider barrel",
     )
     core = 0.5 * (widest + spec.radius)
-    _, far, top, bottom = spec.leaf.limits(layout, spec.gap)
     lugs: list[Shape] = []
     if spec.stops:
+        _, far, top, bottom = spec.leaf.limits(layout, spec.gap)
         spec.stops.check(layout, (far, bottom), spec.wall)
         low, high = spec.angular_range
         if spec.stops.upper:
@@ -218,20 +247,19 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
             layout, widest, spec.chamfer, spec.angle, spec.angular_range
         )
     access = spec.pin.insertion_cuts(layout, 0.5 * spec.length)
+    travel = spec.pin.travel_cuts(layout, 0.5 * spec.length)
     barrels = spec.pin.knuckles(layout, spec.chamfer, spec.bore_form)
     halves = []
-    for owner, side in ((0, -1.0), (1, 1.0)):
+    for owner, (side, mount) in enumerate(zip((-1.0, 1.0), spec.mounts, strict=True)):
+        room = (*access, *(shape for who, shape in travel if who == owner))
         overlapped = spec.chamfer or (bumps and not owner)
         halves.append(
             HalfPlan(
-                (groove(layout, owner, core), *access),
-                (*spec.leaf.web(layout, spec.gap, side), *(lugs if owner else ())),
+                (groove(layout, owner, core), *room),
+                (*mount.web(layout, spec.gap, side), *(lugs if owner else ())),
                 (*(shape for who, shape in barrels if who == owner), *(() if owner else bumps)),
-                (
-                    *spec.leaf.hole_cuts(layout, spec.gap, side),
-                    *(dimples if owner else ()),
-                ),
-                () if overlapped else (groove(layout, owner, spec.radius), *access),
+                (*mount.hole_cuts(layout, spec.gap, side), *(dimples if owner else ())),
+                () if overlapped else (groove(layout, owner, spec.radius), *room),
             )
         )
     return SinglePlan(

@@ -20,11 +20,11 @@ from build123d import (
     Solid,
 )
 
+from .arm import Mount, corner_of
 from .clearance import Clearance
 from .edges import edge_frame
 from .exact_solids import build_all, build_half, build_shape, laid, one_part
 from .exceptions import HingeError
-from .leaf import Bracket, Leaf
 from .let_in import frame_at, let_in, one_body, require_edge
 from .options import BoreStyle, SingleHingeKeywords, SingleHingeOptions, call_of
 from .pins import Pin
@@ -36,6 +36,7 @@ from .placement import (
     require_free_joint,
 )
 from .plan_single import SinglePlan, SingleSpec, plan_single
+from .shapes import Point
 from .stops import Detents, Stops
 from .turn_check import require_turn
 from .turn_sweep import TurnSweep, single_sweep, spread
@@ -96,17 +97,18 @@ class SingleHinge(PlacedPart):
     clearance : Clearance, float or str
         Room between surfaces that move past one another: a :class:`Clearance`, a number in mm, a
         length such as "300 um", or a process: "fdm", "sla", "sls", "mjf", "polyjet".
-    leaf : Bracket or Leaf, optional
-        What joins the knuckles: a bar inside the body (default), or a door hinge's plate.
+    leaf : Bracket, Leaf or Arm, or a pair of them, optional
+        What joins the knuckles to their body: a bar inside it (default), a door hinge's plate, or
+        arms to an axis outside of it. A pair gives the parent's and the child's.
     gap : float, optional
         Distance in mm between the two bodies at 0° and 180°; the radial clearance when left out.
     angle : float
         Angle in degrees at which it is drawn and printed.
     angular_range : (float, float)
-        Lowest and highest angle in degrees, within 0 to 180.
+        Lowest and highest angle in degrees, within 0 to 180; from -90 on with arms.
     opens : float, optional
         How far it opens, in degrees from the closed pose, with a stop there; in place of
-        `angular_range` and `stops`.
+        `angular_range` and `stops`. Beyond 180 with arms, which have no stop.
     closed : {0, 180}
         The angle at which it is closed, for `opens`: 0 where the lid lies on its box, 180 where
         both lie side by side and fold onto one another.
@@ -170,7 +172,7 @@ class SingleHinge(PlacedPart):
         radius: float | None = None,
         pin: Pin | None = None,
         clearance: Clearance | float | str = "fdm",
-        leaf: Bracket | Leaf | None = None,
+        leaf: Mount | tuple[Mount, Mount] | None = None,
         gap: float | None = None,
         angle: float = 0.0,
         angular_range: tuple[float, float] = (0.0, 180.0),
@@ -263,6 +265,15 @@ class SingleHinge(PlacedPart):
         return self._carved("child")
 
     @property
+    def corners(self) -> tuple[Point, Point]:
+        """How far aside of the axis and below it the edges of parent and child lie, in mm."""
+        spec, layout = self.spec, self.plan.layout
+        if not spec.on_arms:
+            return (0.5 * spec.gap, 0.5 * spec.gap), (0.5 * spec.gap, 0.5 * spec.gap)
+        parent, child = (corner_of(mount, layout, spec.gap) for mount in spec.mounts)
+        return parent, child
+
+    @property
     def hardware(self) -> Part | None:
         """The loose pin, screw and nut, or None for a printed pin."""
         loose = self.plan.loose
@@ -321,7 +332,9 @@ class SingleHinge(PlacedPart):
         place = frame_at(at)
         if edge is not None:
             turned = self._at_angle_0(child)
-            place = edge_frame(parent, turned, edge, self.spec.gap) * self.place.inverse()
+            corners = self.corners if self.spec.on_arms else None
+            where = edge_frame(parent, turned, edge, self.spec.gap, corners)
+            place = where * self.place.inverse()
         frame = place * self.place
         bodies = {"parent": one_body(parent, "parent"), "child": one_body(child, "child")}
         require_free_joint(tuple(bodies.items()), joint)
@@ -330,10 +343,11 @@ class SingleHinge(PlacedPart):
         made = []
         for name, body in bodies.items():
             side = _side(name)
-            require_edge(body, name, frame, (layout.start, layout.end), spec.leaf)
+            mount = spec.mounts[0 if side == "parent" else 1]
+            require_edge(body, name, frame, (layout.start, layout.end), mount)
             half, carve = self._half(side).moved(place), self._carved(side).moved(place)
             on_body = frame * Rotation(0, 0, spec.angle) if side == "child" else frame
-            made.append(let_in(body, name, half, carve, on_body, reach, spec.leaf))
+            made.append(let_in(body, name, half, carve, on_body, reach, mount))
         HingeJoint(joint, made[0], frame, spec.angular_range)
         FixedJoint(joint, made[1], frame * Rotation(0, 0, spec.angle))
         if check:

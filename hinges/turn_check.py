@@ -56,16 +56,24 @@ def require_turn(spec: SingleSpec, parent: Part, child: Part, joint: str) -> Non
             "parent and child lie the wrong way round: swap them, or turn the direction along "
             "the edge about"
         )
-    elif tops[high] > spec.radius + 0.1:
+    elif worst.angle < 0.0:
+        offset = 0.5 * spec.gap - boxes[1].min.Y
+        advice = (
+            "below 0° the child hangs beside the wall of its parent, which its thickness takes: "
+            f"give the parent's arm an offset of {offset:.3g} mm or more"
+        )
+    elif tops[high] > spec.radius + 0.1 and not spec.on_arms:
         advice = (
             f"the {('parent', 'child')[high]} reaches {tops[high]:.3g} mm outwards beyond the "
             "axis: put the axis on its outer edge, or give the angular_range that it can turn"
         )
     else:
-        advice = (
-            "keep both in their quadrants beside and below the axis, or give the "
-            "angular_range that they can turn"
+        within = (
+            "behind the walls and below the tops that their arms reach"
+            if spec.on_arms
+            else "in their quadrants beside and below the axis"
         )
+        advice = f"keep both {within}, or give the angular_range that they can turn"
     raise HingeError(
         f"at {worst.angle:.4g}° the bodies overlap by {worst.overlap:.4g} mm³: {advice}"
     )

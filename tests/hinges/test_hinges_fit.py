@@ -1,6 +1,8 @@
 """Clearances, their units, and the rules that refuse a hinge."""
 
 import pickle
+from dataclasses import replace
+from math import pi
 
 import pytest
 
@@ -192,3 +194,36 @@ def test_a_thread_alone_names_its_screw():
     assert ScrewPin("1/4").screw is SCREWS["1/4-20"]
     with pytest.raises(HingeError, match=r"screw 'M7' is unknown: use one of M1\.6, M2"):
         ScrewPin("M7")
+
+
+def test_the_length_of_a_screws_thread():
+    long = {"clearance": 0.4, "leaf": Bracket(10.0)}
+    whole, short = (
+        SingleHinge(60, pin=ScrewPin("M3", thread=thread), **long) for thread in (None, 6.0)
+    )
+    last = whole.plan.layout.knuckles[-1]
+    wider = pi * (0.25 * 3.4**2 - 0.25 * 2.6**2) * (last.length - 6.0)
+    cut = whole.parent_half.volume - short.parent_half.volume
+    assert cut == pytest.approx(wider, rel=1e-3)
+    for part in (short.parent_half, short.hardware):  # the screw's core lies in the tapped bore
+        assert part.solids()[0].is_valid
+    shared = short.parent_half.solid().intersect(short.hardware.solid())
+    assert not shared or sum(one.volume for one in shared.solids()) < 1e-6
+    for length, words in ((3.0, "use a longer thread"), (40.0, "use a shorter thread")):
+        with pytest.raises(FitError, match=words) as refusal:
+            SingleHinge(60, pin=ScrewPin("M3", thread=length), **long)
+        assert refusal.value.rule == "knuckle"
+    with pytest.raises(HingeError, match='give thread with end="tap"'):
+        ScrewPin("M3", end="nut", thread=6.0)
+    with pytest.raises(HingeError, match="thread is 0 mm"):
+        ScrewPin("M3", thread=0.0)
+    lying = SingleHinge(60, pin=ScrewPin("M3", thread=6.0), bore="teardrop", **long)
+    assert len(lying.solids()) == 2
+
+
+def test_a_screw_of_its_own_sizes():
+    pan = replace(SCREWS["M3"], name="pan", cap=6.0, cap_height=1.8)
+    hinge = SingleHinge(40, pin=ScrewPin(pan, sunk=True), clearance=0.4)
+    assert pytest.approx(6.0) == hinge.hardware.bounding_box().size.X
+    with pytest.raises(HingeError, match="unknown"):
+        ScrewPin(3)

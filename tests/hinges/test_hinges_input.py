@@ -42,7 +42,7 @@ from hinges.clearance import PROCESSES
         ({"radius": "3"}, "radius is '3': give a finite number"),
         ({"angle": None}, "angle is None: give a finite number"),
         ({"detents": 90}, "detents is 90: give Detents"),
-        ({"leaf": 3}, r"leaf is 3: give Bracket\(...\) or Leaf"),
+        ({"leaf": 3}, r"leaf is 3: give Bracket\(...\), Leaf"),
         ({"up": float("inf")}, "up is inf"),
     ],
 )

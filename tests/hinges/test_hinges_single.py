@@ -31,6 +31,7 @@ from hinges import (
     ConePin,
     Detents,
     DoubleHinge,
+    FitError,
     HingeCarve,
     HingeError,
     HingeHalf,
@@ -380,6 +381,32 @@ def test_a_flat_leaf_has_its_feet_on_the_bed():
     assert low == pytest.approx(-3 * 0.5**0.5)
     standing = sum(face.area for face in hinge.faces() if abs(face.center().Y - low) < 1e-6)
     assert standing > 30 * 10
+
+
+def test_flat_brackets_lie_in_plates():
+    hinge = SingleHinge(30, clearance=0.3, radius=3, leaf=Bracket(flat=True))
+    low = -3 * 0.5**0.5
+    assert pytest.approx(low) == hinge.bounding_box().min.Y
+    thick, wide = -low - 0.15, 20.0
+    plates = [
+        Pos(side * (0.15 + wide / 2), -0.15 - thick / 2, 0) * Box(wide, thick, 30)
+        for side in (-1, 1)
+    ]
+    parent, child = hinge.fit(*plates, check=False)
+    swept = hinge.sweep(parent, child, range(0, 181, 10))
+    assert swept.gap == pytest.approx(0.3, abs=0.01)
+    assert swept.worst.overlap == 0.0
+    for body in (parent, child):
+        assert pytest.approx(low) == body.bounding_box().min.Y
+        lying = sum(face.area for face in body.faces() if abs(face.center().Y - low) < 1e-6)
+        assert lying > wide * 30 * 0.9
+    with pytest.raises(FitError, match="the thickness of a flat bracket") as refusal:
+        SingleHinge(30, clearance=0.3, radius=3, leaf=Bracket(depth=0.5, flat=True))
+    assert refusal.value.rule == "bracket"
+    with pytest.raises(HingeError, match="has no gusset"):
+        Bracket(flat=True, gusset=True)
+    with pytest.raises(HingeError, match="bracket is flat"):
+        DoubleHinge(20, bracket=Bracket(flat=True))
 
 
 def test_the_hinge_moves_with_a_location():
