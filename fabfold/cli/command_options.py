@@ -132,8 +132,9 @@ PinName = Annotated[
     str | None,
     typer.Option(
         "--pin",
-        metavar="1.75|2.85|rod-2",
-        help="Pin of bodies that are printed apart: a piece of filament, or of rod. Default: 1.75.",
+        metavar="1.75|2.85|rod-2|m2",
+        help="Pin of bodies that are printed apart: a piece of filament or of rod, or a screw M2. "
+        "Default: 1.75.",
     ),
 ]
 RetentionName = Annotated[

@@ -60,8 +60,8 @@ class Recipe(BaseModel):
         Field(description="in-place as one object, apart body by body; auto: as the profile can"),
     ] = "auto"
     pin: Annotated[
-        Literal["1.75", "2.85", "rod-2"],
-        Field(description="loose pin of bodies printed apart: filament 1.75 or 2.85, rod-2"),
+        Literal["1.75", "2.85", "rod-2", "m2"],
+        Field(description="loose pin of bodies printed apart: filament 1.75 or 2.85, rod-2, m2"),
     ] = "1.75"
     retention: Annotated[
         Literal["none", "magnet"], Field(description="what holds the box shut: none, or magnet")
