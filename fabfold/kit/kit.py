@@ -280,8 +280,8 @@ class Kit(StageRunner):
                 with EarlyKit(target, self.recipe, mode, self.listener) as self._early:
                     self.fold()
             built = self.join()
-            path, tree = target / f"{self.recipe.name}.step", built.planned.tree
-            with StepProcess(path, built.joinery, tree, beside=self.workers != 1) as step:
+            path = target / f"{self.recipe.name}.step"
+            with StepProcess(path, built, beside=self.workers != 1) as step:
                 checks = self.check()
                 with self._open_progress("export") as progress:
                     write_kit(

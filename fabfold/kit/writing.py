@@ -22,6 +22,7 @@ from fabfold.kit.box_closure import BoxClosure
 from fabfold.kit.figure_pictures import figure_pictures
 from fabfold.kit.guide_files import PICTURE, write_guide
 from fabfold.kit.stages import BuiltTree, PlannedTree
+from fabfold.kit.step_process import assembled_path
 from fabfold.lattice.template import Template
 from fabfold.printing.checks import Check
 from fabfold.printing.print_mode import PrintMode
@@ -66,6 +67,7 @@ def remove_named(folder: Path, names: Iterable[str]) -> None:
     for name in names:
         for ending in _NAMED:
             (folder / f"{name}{ending}").unlink(missing_ok=True)
+        assembled_path(folder / f"{name}.step").unlink(missing_ok=True)
 
 
 def write_stage(kit: Kit, stage: str, result: Any) -> None:
