@@ -36,6 +36,7 @@ from fabfold.cli.command_options import (
     Pick,
     PinName,
     Pitch,
+    Pose,
     Prefer,
     Print,
     ProfileName,
@@ -48,6 +49,7 @@ from fabfold.cli.command_options import (
     Scheduler,
     Seed,
     Share,
+    Slicer,
     Source,
     TemplateCells,
     TemplateName,
@@ -56,6 +58,7 @@ from fabfold.cli.command_options import (
     Void,
     VoxelMm,
     Workers,
+    number_or_text,
 )
 from fabfold.errors import (
     CheckError,
@@ -128,14 +131,6 @@ def _forget_stdout() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _number(text: str | None) -> float | str | None:
-    """A number where the text is one, else the text."""
-    try:
-        return text if text is None else float(text)
-    except ValueError:
-        return text
-
-
 def _kit(source: str, output: Path | None, quiet: bool, **options: Any) -> Kit:
     from fabfold.cli.console import ConsoleListener
     from fabfold.kit.kit import open_kit
@@ -143,7 +138,7 @@ def _kit(source: str, output: Path | None, quiet: bool, **options: Any) -> Kit:
     for name in ("keep", "protect"):
         options[name] = options[name] or None
     for name in ("prefer", "void", "thicken"):
-        options[name] = _number(options[name])
+        options[name] = number_or_text(options[name])
     if output is None and not (Path(source).is_dir() or source.endswith(".toml")):
         output = Path(f"{Path(source.removeprefix('sample:')).stem}-kit")
     kit = open_kit(source, folder=output, **options)
@@ -169,6 +164,8 @@ def _stage(name: str, summary: str) -> None:
         clearance_mm: ClearanceMm = None,
         print: Print = None,
         pin: PinName = None,
+        pose: Pose = None,
+        slicer: Slicer = None,
         retention: RetentionName = None,
         magnet: MagnetName = None,
         seed: Seed = None,

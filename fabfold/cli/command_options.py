@@ -30,6 +30,7 @@ __all__ = [
     "Pick",
     "PinName",
     "Pitch",
+    "Pose",
     "Prefer",
     "Print",
     "ProfileName",
@@ -42,6 +43,7 @@ __all__ = [
     "Scheduler",
     "Seed",
     "Share",
+    "Slicer",
     "Source",
     "TemplateCells",
     "TemplateName",
@@ -50,6 +52,7 @@ __all__ = [
     "Void",
     "VoxelMm",
     "Workers",
+    "number_or_text",
 ]
 
 Source = Annotated[
@@ -135,6 +138,24 @@ PinName = Annotated[
         metavar="1.75|2.85|rod-2|m2",
         help="Pin of bodies that are printed apart: a piece of filament or of rod, or a screw M2. "
         "Default: 1.75.",
+    ),
+]
+Pose = Annotated[
+    str | None,
+    typer.Option(
+        "--pose",
+        metavar="a|b|auto|N",
+        help="Pose in which a kit is printed in place: the model (a, the default), the box (b), "
+        "after move N of the path, or the one that prints best (auto).",
+    ),
+]
+Slicer = Annotated[
+    str | None,
+    typer.Option(
+        "--slicer",
+        metavar="any|prusa|prusa3|orca|bambu|all",
+        help="Write the 3MF of a kit in place for this slicer too, as one object of named parts in "
+        "the kit's colours. Default: any, which is for Bambu Studio and OrcaSlicer.",
     ),
 ]
 RetentionName = Annotated[
@@ -336,3 +357,11 @@ Json = Annotated[
     typer.Option("--json", help="With 'check': the checks as JSON, and nothing else."),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")]
+
+
+def number_or_text(text: str | None) -> float | str | None:
+    """A number where the text of an option is one, else the text."""
+    try:
+        return text if text is None else float(text)
+    except ValueError:
+        return text

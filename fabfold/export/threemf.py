@@ -32,27 +32,24 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.export.bambu import UNIT_MATRIX, bambu_model, bambu_project
+from fabfold.export.bambu import bambu_model, bambu_project
 from fabfold.export.colours import palette
+from fabfold.export.prusa import prusa_model, prusa_project
 from fabfold.export.weld import printable_mesh
 from fabfold.files import write_bytes
 from fabfold.joinery.bodies import Joinery
 
 __all__ = ["Layout", "posed", "write_3mf"]
 
+#: Kinds of the files that may come with a model.
+_CONTENT_TYPES = {"pdf": "application/pdf", "csv": "text/csv"}
+
 #: How the bodies are grouped in the file; see the description above.
-#: Kinds of the files that may come with a model.
-_CONTENT_TYPES = {"pdf": "application/pdf", "csv": "text/csv"}
-
-#: Kinds of the files that may come with a model.
-_CONTENT_TYPES = {"pdf": "application/pdf", "csv": "text/csv"}
-
 Layout = Literal["kit", "assembly", "apart"]
 
 #: Metadata names that the core specification knows; all others get a name space of their own.
@@ -110,6 +107,7 @@ def write_3mf(
     layout: Layout = "kit",
     thumbnail: bytes | None = None,
     keep_place: bool = False,
+    coloured_parts: bool = False,
     settings: Callable[[list[int]], Mapping[str, str]] | None = None,
     auxiliaries: Mapping[str, bytes] | None = None,
 ) -> None:
@@ -136,6 +134,9 @@ def write_3mf(
     keep_place : bool
         Whether the bodies stay where they are; otherwise they are moved so that all coordinates
         begin at 0.
+    coloured_parts : bool
+        With the layout "kit": whether PrusaSlicer, where it opens the file as a project, shows each
+        body in its colour, as of an extruder of its own.
     settings : callable, optional
         Files of slicer settings by name, in place of the layout's own; it is given the number of
         each body's object.
@@ -186,7 +187,13 @@ def write_3mf(
             # PrusaSlicer fails on objects of type "model" that are not built.
             body.SetType(lib3mf.ObjectType.Other)
         whole = _add_whole(lib3mf, model, title, meshes, materials.GetResourceID(), paints)
-        attached = {"Slic3r_PE_model.config": _prusa_config(whole, title, names, meshes)}
+        ranges = [(name, len(faces)) for name, (_, faces) in zip(names, meshes, strict=True)]
+        number = whole.GetModelResourceID()
+        attached = {
+            "Slic3r_PE_model.config": prusa_model(number, title, ranges, coloured=coloured_parts)
+        }
+        if coloured_parts:
+            attached["Slic3r_PE.config"] = prusa_project(np.asarray(colours))
         built = [whole]
     elif layout == "assembly":
         whole = _add_assembly(wrapper, model, title, names, bodies, space)
@@ -306,24 +313,3 @@ def _add_assembly(
         component = whole.AddComponent(body, wrapper.GetIdentityTransform())
         component.SetUUID(str(uuid.uuid5(space, f"component {name}")))
     return whole
-
-
-def _prusa_config(whole: Any, title: str, names: list[str], meshes: list[_Mesh]) -> str:
-    """The file by which PrusaSlicer and SuperSlicer see the bodies as named parts of one object."""
-    lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        "<config>",
-        f' <object id="{whole.GetModelResourceID()}" instances_count="1">',
-        f'  <metadata type="object" key="name" value={quoteattr(title)}/>',
-    ]
-    start = 0
-    for name, (_, faces) in zip(names, meshes, strict=True):
-        lines += [
-            f'  <volume firstid="{start}" lastid="{start + len(faces) - 1}">',
-            f'   <metadata type="volume" key="name" value={quoteattr(name)}/>',
-            '   <metadata type="volume" key="volume_type" value="ModelPart"/>',
-            f'   <metadata type="volume" key="matrix" value="{UNIT_MATRIX}"/>',
-            "  </volume>",
-        ]
-        start += len(faces)
-    return "\n".join([*lines, " </object>", "</config>", ""])

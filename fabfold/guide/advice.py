@@ -97,6 +97,11 @@ def print_lines(mode: PrintMode, joinery: Joinery) -> list[str]:
             "Print it as it lies, as one object. Let it cool, free it from powder or support, and "
             "turn every hinge once to and fro."
         )
+        if mode.pose != "a":
+            lines.append(
+                "It does not come out as the model: the report names the move of the path after "
+                "which it is printed. Go the steps backwards from there to the model."
+            )
     return lines
 
 

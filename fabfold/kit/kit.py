@@ -329,10 +329,10 @@ class Kit(StageRunner):
         from fabfold.printing.profiles import load_profile
 
         recipe = self.recipe
-        magnet = recipe.magnet if recipe.retention == "magnet" else ""
         return print_mode(
-            load_profile(recipe.profile), recipe.print, recipe.pin, recipe.clearance_mm, magnet
-        )
+            load_profile(recipe.profile), recipe.print, recipe.pin, recipe.clearance_mm,
+            recipe.magnet if recipe.retention == "magnet" else "", recipe.pose,
+        )  # fmt: skip
 
     @property
     def kernel_seconds(self) -> float:

@@ -32,6 +32,8 @@ class PrintMode:
     magnet : str
         Name of the magnets that hold the box shut, of :data:`fabfold.joinery.magnets.MAGNETS`;
         empty where nothing does.
+    pose : str
+        Pose in which it is printed in place, as of :func:`fabfold.printing.print_pose.print_pose`.
     """
 
     apart: bool
@@ -39,6 +41,7 @@ class PrintMode:
     profile: Profile
     pin: str
     magnet: str = ""
+    pose: str = "a"
 
     @property
     def name(self) -> str:
@@ -101,6 +104,7 @@ def print_mode(
     pin: str = "1.75",
     clearance_mm: float | None = None,
     magnet: str = "",
+    pose: str = "a",
 ) -> PrintMode:
     """Choose how a kit is printed.
 
@@ -116,6 +120,8 @@ def print_mode(
         Clearance in the hinges, mm, in place of the profile's.
     magnet : str
         Name of the magnets that hold the box shut; empty for none.
+    pose : str
+        Pose in which it is printed in place.
 
     Returns
     -------
@@ -142,4 +148,4 @@ def print_mode(
             f"at least; give more than that (its own clearance is {gaps.clearance_mm:g} mm)"
         )
     gapped = profile.model_copy(update={"clearance_mm": clearance, "min_gap_mm": gaps.min_gap_mm})
-    return PrintMode(apart, why, gapped, pin, magnet)
+    return PrintMode(apart, why, gapped, pin, magnet, pose)
