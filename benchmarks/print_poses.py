@@ -1,4 +1,6 @@
-"""Poses in which finished kits can be printed in place: python benchmarks/print_poses.py KIT [KIT ...].
+"""Poses in which finished kits can be printed in place.
+
+    python benchmarks/print_poses.py KIT [KIT ...]
 
 Prints, for every pose of the path of each kit folder, its size, the box around it, and how much of
 the surface has nothing but the gap before it; then the pose that ``--pose auto`` takes.

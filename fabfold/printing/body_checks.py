@@ -10,9 +10,10 @@ from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.cells import solids_of
 from fabfold.printing.checks import Check
+from fabfold.printing.escape_checks import check_escape
 from fabfold.printing.gap_checks import check_gaps
 from fabfold.printing.overhang_checks import check_overhang
-from fabfold.printing.print_pose import PrintPose
+from fabfold.printing.print_pose import PrintPose, posed_kit
 from fabfold.printing.profiles import Profile
 from fabfold.printing.size_checks import check_sizes
 from fabfold.printing.topology_checks import check_topology
@@ -67,6 +68,9 @@ def check_bodies(
     checks += check_gaps(joinery.bodies, solids, profile, reach, hinged)
     progress.update(0.6, "walls")
     checks += check_walls(joinery, solids, profile)
+    progress.update(0.8, "ways out")
+    placed = None if pose is None else posed_kit(joinery, pose).bodies
+    checks += check_escape(joinery.bodies, profile, placed)
     progress.update(0.9, "sizes and overhangs")
     checks += check_sizes(joinery, tree, motion, profile, pose)
     checks.append(check_overhang(joinery, profile))
