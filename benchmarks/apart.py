@@ -83,14 +83,12 @@ def row_of(folder: Path, slicing: bool) -> dict[str, Any]:
         )  # fmt: skip
         lap("bodies")
         bores = pin_bores(tree, joinery)
-        steps = find_order(tree, motion, joinery, bores, fit.slip_mm, SilentProgress())
+        steps = find_order(tree, motion, joinery, bores, mode.pin_fit, SilentProgress())
         lap("order")
         ends = {step.pin: step.end for step in steps}
-        joinery = with_pins(
-            joinery, bores, [ends[i] for i in range(len(bores))], fit.grip_mm, fit.slip_mm
-        )
+        joinery = with_pins(joinery, bores, [ends[i] for i in range(len(bores))], mode.pin_fit)
         lap("pins")
-        seen = replay_assembly(tree, joinery, bores, steps)
+        seen = replay_assembly(tree, joinery, bores, steps, mode.pin_fit)
         lap("replay")
         proof = certify(
             tree, motion, meshes_with_pins(joinery), 20.0, joinery.origin_mm, fit.min_gap_mm

@@ -114,12 +114,15 @@ class LoosePin(Pin):
         Diameter of the pin in mm.
     grip, slip : float
         How much wider than the pin the bore is, in mm of its radius: `grip` in the pin owner's
-        knuckles, `slip` in the others'.
+        knuckles, `slip` in the others'. A grip below 0 is a bore that a thread cuts itself into.
     heads : bool
         Whether both ends are countersunk, for a filament whose ends are melted into heads.
     entry : {"both", "start", "end", "none"}
         Ends of the knuckles, by their place along z, beyond which the bodies are cleared so that
         the pin can go in; "none" leaves the bodies to their owner.
+    pocket : float
+        Radius in mm of the widest pocket that somebody cuts into the barrel later, such as for a
+        screw's head; the barrel keeps its wall around it.
     """
 
     diameter: float
@@ -127,6 +130,7 @@ class LoosePin(Pin):
     slip: float = 0.15
     heads: bool = False
     entry: Literal["both", "start", "end", "none"] = "both"
+    pocket: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what is no pin."""
@@ -145,13 +149,13 @@ class LoosePin(Pin):
 
     def largest_radius(self, layout: KnuckleLayout, bore_form: BoreForm) -> float:
         """Largest radius in mm that the pin takes out of a barrel."""
-        wide = (0.5 * self.diameter + self.slip) * bore_form.factor
+        wide = max((0.5 * self.diameter + self.slip) * bore_form.factor, self.pocket)
         return max(wide, 0.5 * self.diameter + self.slip + self._HEAD) if self.heads else wide
 
     def thinnest_barrel(self, clearance: Clearance, wall: float, knuckles: int) -> float:
         """Smallest barrel radius in mm that leaves `wall` around a teardrop bore."""
         del clearance, knuckles
-        wide = (0.5 * self.diameter + self.slip) * BoreForm("teardrop").factor
+        wide = max((0.5 * self.diameter + self.slip) * BoreForm("teardrop").factor, self.pocket)
         return max(wide, 0.5 * self.diameter + self.slip + self._HEAD * self.heads) + wall
 
     def check(self, layout: KnuckleLayout, wall: float, bore_form: BoreForm) -> None:
@@ -210,7 +214,7 @@ class LoosePin(Pin):
 
     def contact_circles(self, layout: KnuckleLayout) -> tuple[ContactCircle, ...]:
         """Both ends of every bore; the pin's room on both sides counts."""
-        return loose_pin_contacts(layout, 0.5 * self.diameter, self.grip + self.slip)
+        return loose_pin_contacts(layout, 0.5 * self.diameter, max(self.grip, 0.0) + self.slip)
 
     def hardware(self, layout: KnuckleLayout, bore_form: BoreForm) -> tuple[Shape, ...]:
         """Draw the pin."""
@@ -226,7 +230,7 @@ class FilamentPin(LoosePin):
     ----------
     diameter : float
         Diameter of the filament: 1.75 or 2.85 mm.
-    grip, slip, heads, entry
+    grip, slip, heads, entry, pocket
         As for :class:`LoosePin`.
     """
 
@@ -249,7 +253,7 @@ class RodPin(LoosePin):
     ----------
     diameter : float
         Diameter of the rod in mm.
-    grip, slip, heads, entry
+    grip, slip, heads, entry, pocket
         As for :class:`LoosePin`.
     """
 

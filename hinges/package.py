@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .exceptions import HingeError
-from .slicer_parts import bambu_model, bambu_project, prusa_model
+from .slicer_parts import bambu_model, bambu_project, prusa_model, prusa_project
 
 __all__ = ["DECIMALS", "Layout", "PackagePart", "package_3mf"]
 
@@ -157,6 +157,7 @@ def package_3mf(
     model.SetBuildUUID(str(uuid.uuid5(space, "build")))
     work = _Work(lib3mf, wrapper, model, closed)
     attached: dict[str, str] = {}
+    colours = np.array([part.colour for part in parts], dtype=np.uint8)
     paints = None if filaments else work.paints(parts, filaments=False)
     bodies = [] if layout == "whole" else [work.mesh(part) for part in parts]
     for body, part in zip(bodies, parts, strict=False):
@@ -170,11 +171,12 @@ def package_3mf(
         ranges = [(part.name, len(part.faces)) for part in parts]
         number = whole.GetModelResourceID()
         attached["Slic3r_PE_model.config"] = prusa_model(number, title, ranges, filaments=filaments)
+        if filaments and layout == "kit":
+            attached["Slic3r_PE.config"] = prusa_project(colours)
         built = [whole]
     elif layout == "assembly":
         whole = work.assembly(title, parts, bodies, space)
         numbered = [(b.GetModelResourceID(), p.name) for b, p in zip(bodies, parts, strict=True)]
-        colours = np.array([part.colour for part in parts], dtype=np.uint8)
         attached = {
             "model_settings.config": bambu_model(whole.GetModelResourceID(), title, numbered),
             "project_settings.config": bambu_project(_BAMBU_BED_MM, colours),

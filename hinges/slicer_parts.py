@@ -1,10 +1,13 @@
 """The settings by which slicers see named, coloured parts and plates in a 3MF.
 
 PrusaSlicer and SuperSlicer read ``Metadata/Slic3r_PE_model.config``: which triangles of one object
-are which part. Bambu Studio and OrcaSlicer read ``Metadata/model_settings.config`` whoever wrote
-the file: one entry an object, with its parts. Plates and colours count only where the file's
-``Application`` is Bambu Studio and ``Metadata/project_settings.config`` is not empty. Few fields
-are written, all of them such as the slicers' own files have.
+are which part. PrusaSlicer 3 does so only where the file's ``Application`` is PrusaSlicer of up to
+2.99.1. A part has the colour of its extruder, which ``Metadata/Slic3r_PE.config`` names; it counts
+where the file is opened as a project. Bambu Studio and OrcaSlicer read
+``Metadata/model_settings.config`` whoever wrote the file: one entry an object, with its parts.
+Plates and colours count only where the file's ``Application`` is Bambu Studio and
+``Metadata/project_settings.config`` is not empty. Few fields are written, all of them such as the
+slicers' own files have.
 """
 
 from __future__ import annotations
@@ -16,11 +19,19 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BAMBU", "PRUSA", "bambu_model", "bambu_plates", "bambu_project", "prusa_model"]
+__all__ = [
+    "BAMBU",
+    "PRUSA",
+    "bambu_model",
+    "bambu_plates",
+    "bambu_project",
+    "prusa_model",
+    "prusa_project",
+]
 
 #: What ``Application`` says: the release whose form is written.
 BAMBU = "BambuStudio-01.09.00.00"
-PRUSA = "PrusaSlicer-2.9.0"
+PRUSA = "PrusaSlicer-2.9.2"
 #: Matrix of a part that stays where it is, as both families of slicers write it.
 _UNIT_MATRIX = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
 _HEAD = ['<?xml version="1.0" encoding="UTF-8"?>', "<config>"]
@@ -77,6 +88,29 @@ def prusa_model(
         ]
         start += count
     return "\n".join([*lines, " </object>", "</config>", ""])
+
+
+def prusa_project(colours: NDArray[np.uint8]) -> str:
+    """``Slic3r_PE.config``: a printer with an extruder for each colour.
+
+    Parameters
+    ----------
+    colours : (n, 3) uint8 array
+        sRGB of each extruder.
+
+    Returns
+    -------
+    str
+        Lines of ``; key = value``, as PrusaSlicer writes them.
+    """
+    named = ";".join("#{:02X}{:02X}{:02X}".format(*colour) for colour in colours.tolist())
+    lines = [
+        f"; extruder_colour = {named}",
+        f"; filament_colour = {named}",
+        f"; nozzle_diameter = {','.join(['0.4'] * len(colours))}",
+        "; printer_technology = FFF",
+    ]
+    return "\n".join([*lines, ""])
 
 
 def bambu_model(whole: int, title: str, parts: Sequence[tuple[int, str]]) -> str:

@@ -30,6 +30,7 @@ from fabfold.proof.certify import certify
 
 PLA = load_profile("fdm-pla-0.4")
 FIT = PLA.apart
+FILAMENT = print_mode(PLA).pin_fit
 
 
 def box(low, high):
@@ -63,7 +64,7 @@ def open_bodies(bar_kit):
 @pytest.fixture(scope="module")
 def made(open_bodies):
     tree, motion, joinery = open_bodies
-    joinery, kit = prepare_apart(tree, motion, joinery, PLA, SilentProgress())
+    joinery, kit = prepare_apart(tree, motion, joinery, print_mode(PLA), SilentProgress())
     return tree, motion, joinery, kit
 
 
@@ -167,16 +168,18 @@ def test_the_replay_finds_a_pin_from_the_closed_end_and_a_side_from_below(made):
     bores = pin_bores(tree, joinery)
     first = kit.steps[0]
     closed = [replace(first, end=-first.end), *kit.steps[1:]]
-    seen = replay_assembly(tree, joinery, bores, closed)
+    seen = replay_assembly(tree, joinery, bores, closed, FILAMENT)
     assert seen.done == len(kit.steps) - 1
     assert f"{tree.hinges[bores[first.pin].hinge].name}: body-" in seen.faults[0]
     assert "in the way of the pin" in seen.faults[0]
     # Along the axis the knuckles of one side run into those of the other.
     x, y, z = bores[first.pin].axis.tolist()
-    seen = replay_assembly(tree, joinery, bores, [replace(first, away=(x, y, z)), *kit.steps[1:]])
+    seen = replay_assembly(
+        tree, joinery, bores, [replace(first, away=(x, y, z)), *kit.steps[1:]], FILAMENT
+    )
     assert seen.done == len(kit.steps) - 1
     assert "before its place" in seen.faults[0]
-    assert replay_assembly(tree, joinery, bores, kit.steps[1:]).done < len(kit.steps)
+    assert replay_assembly(tree, joinery, bores, kit.steps[1:], FILAMENT).done < len(kit.steps)
 
 
 def test_a_kit_without_an_order_is_refused_and_the_hinge_is_named(open_bodies):
@@ -196,7 +199,7 @@ def test_a_kit_without_an_order_is_refused_and_the_hinge_is_named(open_bodies):
     with pytest.raises(GeometryError, match="no order of assembly: no pin of hinge-"):
         find_order(
             tree, still, replace(joinery, bodies=tuple(bodies)),
-            [bore], FIT.slip_mm, SilentProgress(),
+            [bore], FILAMENT, SilentProgress(),
         )  # fmt: skip
 
 
@@ -353,7 +356,7 @@ def test_a_filament_printer_is_told_that_a_closed_kit_fuses(bar_kit):
     from fabfold.kit.checking import run_checks
 
     built = bar_kit.join()
-    checks = run_checks(built, print_mode(PLA, "in-place"), SilentProgress())
+    checks = run_checks(built, print_mode(PLA, "in-place", pose="b"), SilentProgress())
     (lies,) = (check for check in checks if check.name == "prints as it lies")
     assert not lies.ok
     assert "--print apart" in lies.note
@@ -415,10 +418,10 @@ def test_double_hinges_have_a_pin_an_axis_and_go_together(sides, turns):
         face_gap_mm=FIT.face_gap_mm,
         pin=print_mode(PLA).loose_pin(),
     )
-    joinery, kit = prepare_apart(tree, motion, joinery, PLA, SilentProgress())
+    joinery, kit = prepare_apart(tree, motion, joinery, print_mode(PLA), SilentProgress())
     assert len(joinery.pins) == 2
     assert {pin.owner for pin in joinery.pins} == {0, 2}  # the link turns on both
-    seen = replay_assembly(tree, joinery, pin_bores(tree, joinery), kit.steps)
+    seen = replay_assembly(tree, joinery, pin_bores(tree, joinery), kit.steps, FILAMENT)
     assert (seen.done, seen.faults) == (2, ())
     proof = certify(tree, motion, meshes_with_pins(joinery), 20.0, joinery.origin_mm, 0.1)
     assert proof["min_gap_mm"] >= 0.1
@@ -445,7 +448,9 @@ def test_a_kit_that_does_not_go_together_fails_its_check_and_says_where(made):
     tree, _, joinery, kit = made
     bores = pin_bores(tree, joinery)
     first = kit.steps[0]
-    seen = replay_assembly(tree, joinery, bores, [replace(first, end=-first.end), *kit.steps[1:]])
+    seen = replay_assembly(
+        tree, joinery, bores, [replace(first, end=-first.end), *kit.steps[1:]], FILAMENT
+    )
     checks = {check.name: check for check in check_apart(joinery, replace(kit, replay=seen))}
     pins = checks["pins that can be pushed in"]
     assert not pins.ok

@@ -291,7 +291,7 @@ def kit(tmp_path_factory):
     folder = tmp_path_factory.mktemp("double")
     solid = Solid("arm", voxels.vertices * VOXEL, voxels.faces)
     recipe = Recipe(model="arm.stl", template="box-2x2x2")
-    with StepProcess(folder / "arm.step", joinery, tree) as step:
+    with StepProcess(folder / "arm.step", made) as step:
         write_kit(folder, recipe, mode, solid, made, checks, SilentProgress(), step.wait)
     return folder, tree, joinery, checks
 

@@ -12,7 +12,7 @@ from fabfold.errors import GeometryError
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.loose_pins import pin_bores, with_pins
-from fabfold.printing.profiles import Profile
+from fabfold.printing.print_mode import PrintMode
 from fabfold.progress import Progress
 from fabfold.tree.fold_tree import FoldTree
 
@@ -54,7 +54,7 @@ class ApartKit:
 
 
 def prepare_apart(
-    tree: FoldTree, motion: Motion, joinery: Joinery, profile: Profile, progress: Progress
+    tree: FoldTree, motion: Motion, joinery: Joinery, mode: PrintMode, progress: Progress
 ) -> tuple[Joinery, ApartKit]:
     """Find the order of assembly, finish the bodies for it, and lay them on plates.
 
@@ -66,8 +66,8 @@ def prepare_apart(
         The folding path.
     joinery : Joinery
         Bodies with open bores, from :func:`fabfold.joinery.build.build_bodies`.
-    profile : Profile
-        Printer and material.
+    mode : PrintMode
+        Printer, material and pin.
     progress : Progress
         Hears what is being done.
 
@@ -86,16 +86,14 @@ def prepare_apart(
         If a body fits no plate.
     """
     bores = pin_bores(tree, joinery)
-    fit = profile.apart
+    fit = mode.pin_fit
     progress.update(None, "order of assembly")
-    steps = find_order(tree, motion, joinery, bores, fit.slip_mm, progress)
+    steps = find_order(tree, motion, joinery, bores, fit, progress)
     ends = {step.pin: step.end for step in steps}
-    joinery = with_pins(
-        joinery, bores, [ends[i] for i in range(len(bores))], fit.grip_mm, fit.slip_mm
-    )
+    joinery = with_pins(joinery, bores, [ends[i] for i in range(len(bores))], fit)
     # The search looks along a grid of lines; what is finer shows when it is played through.
-    seen = replay_assembly(tree, joinery, bores, steps)
+    seen = replay_assembly(tree, joinery, bores, steps, fit)
     if seen.done < seen.pins:
         raise GeometryError(f"no order of assembly: {seen.faults[0]}")
     progress.update(None, "plates")
-    return joinery, ApartKit(tuple(steps), lay_out_plates(joinery, bores, profile), seen)
+    return joinery, ApartKit(tuple(steps), lay_out_plates(joinery, bores, mode.profile), seen)

@@ -27,6 +27,7 @@ from fabfold.joinery.loose_pins import (
     entry_channel,
     pin_rod,
 )
+from fabfold.joinery.pin_kinds import PinFit
 from fabfold.progress import Progress
 from fabfold.tree.fold_tree import FoldTree
 
@@ -37,7 +38,7 @@ __all__ = ["AssemblyStep", "find_order", "poses_to_try"]
 
 Floats = NDArray[np.float64]
 
-#: The rod that has to be free is this much wider than the pin, in radius, mm.
+#: The rod that has to be free is this much wider than the pin or its head, in radius, mm.
 ROD_ROOM_MM = 0.1
 #: Bodies hit a rod where they share more than this with it, mm³.
 _TOUCH_MM3 = 1e-3
@@ -122,7 +123,7 @@ def find_order(
     motion: Motion,
     joinery: Joinery,
     bores: Sequence[PinBore],
-    slip_mm: float,
+    fit: PinFit,
     progress: Progress,
 ) -> list[AssemblyStep]:
     """Find an order in which all pins can be pushed in.
@@ -137,8 +138,8 @@ def find_order(
         Bodies with open bores.
     bores : sequence of PinBore
         Where the pins go.
-    slip_mm : float
-        How much wider than the pin the loosest bore is, in radius, mm.
+    fit : PinFit
+        How the pins sit in their bores.
     progress : Progress
         Hears how many pins have their place in the order.
 
@@ -152,7 +153,7 @@ def find_order(
     GeometryError
         If some pins cannot be pushed in, in no pose and from no end; it names their hinges.
     """
-    search = _Disassembly(tree, motion, joinery, bores, slip_mm)
+    search = _Disassembly(tree, motion, joinery, bores, fit)
     steps: list[AssemblyStep] = []
     todo = [(frozenset(range(len(tree.bodies))), 0)]
     while todo:
@@ -180,20 +181,20 @@ class _Disassembly:
         motion: Motion,
         joinery: Joinery,
         bores: Sequence[PinBore],
-        slip_mm: float,
+        fit: PinFit,
     ) -> None:
         self._tree, self._joinery, self._bores = tree, joinery, bores
         self._angles = poses_to_try(motion)
         self._solids = solids_of(joinery.bodies)
         self._placed: dict[int, Floats] = {}
         self._posed: dict[tuple[int, int], manifold3d.Manifold] = {}
+        widest = max(joinery.pin_radius_mm, fit.head_mm)
         self._rods = [
-            {e: pin_rod(bore, e, joinery.pin_radius_mm + ROD_ROOM_MM) for e in (1, -1)}
-            for bore in bores
+            {e: pin_rod(bore, e, widest + ROD_ROOM_MM) for e in (1, -1)} for bore in bores
         ]
-        self._ends = [self._cheap_ends(bore, slip_mm) for bore in bores]
+        self._ends = [self._cheap_ends(bore, fit) for bore in bores]
 
-    def _cheap_ends(self, bore: PinBore, slip_mm: float) -> list[int]:
+    def _cheap_ends(self, bore: PinBore, fit: PinFit) -> list[int]:
         """Ends at which a pin may go in as far as its own bodies are concerned, cheapest first.
 
         Its bodies give way to it, but for knuckles of theirs on other axes.
@@ -205,7 +206,7 @@ class _Disassembly:
             if other is not bore and set(other.bodies) & set(bore.bodies)
         ]
         for end in (1, -1):
-            channel = entry_channel(bore, end, self._joinery, slip_mm)
+            channel = entry_channel(bore, end, self._joinery, fit)
             taken = [self._solids[body] ^ channel for body in bore.bodies]
             if any((part ^ barrel).volume() > _TOUCH_MM3 for part in taken for barrel in barrels):
                 continue

@@ -14,7 +14,8 @@ from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.joinery.booleans import evaluated
 from fabfold.joinery.cells import solids_of
-from fabfold.joinery.loose_pins import PinBore, meshes_with_pins, pin_rod
+from fabfold.joinery.loose_pins import PinBore, meshes_with_pins, pin_way
+from fabfold.joinery.pin_kinds import PinFit
 from fabfold.tree.fold_tree import FoldTree
 
 if TYPE_CHECKING:
@@ -53,7 +54,11 @@ class PinReplay:
 
 
 def replay_assembly(
-    tree: FoldTree, joinery: Joinery, bores: Sequence[PinBore], steps: Sequence[AssemblyStep]
+    tree: FoldTree,
+    joinery: Joinery,
+    bores: Sequence[PinBore],
+    steps: Sequence[AssemblyStep],
+    fit: PinFit,
 ) -> PinReplay:
     """Put a kit together in an order, with FCL looking for collisions.
 
@@ -71,6 +76,8 @@ def replay_assembly(
         Where the pins go.
     steps : sequence of AssemblyStep
         The order.
+    fit : PinFit
+        How the pins sit in their bores.
 
     Returns
     -------
@@ -104,7 +111,8 @@ def replay_assembly(
                     f"{name}: {other} meets {one} {STEP_MM * count:.1f} mm before its place"
                 )
                 break
-        blocking = _in_the_way(joinery, solids, bore, step, pin.diameter_mm / 2, poses)
+        way = pin_way(bore, step.end, pin, fit).transform(poses[bore.bodies[0]][:3])
+        blocking = _in_the_way(joinery, solids, step, way, poses)
         if hit is None and blocking:
             faults.append(f"{name}: {blocking} is in the way of the pin")
         placed.append(step.pin)
@@ -157,15 +165,12 @@ def _collision(
 def _in_the_way(
     joinery: Joinery,
     solids: list[manifold3d.Manifold],
-    bore: PinBore,
     step: AssemblyStep,
-    radius: float,
+    way: manifold3d.Manifold,
     poses: Floats,
 ) -> str:
     """First body that the pin or its pusher meets on the way in; empty where there is none."""
-    rod = evaluated(
-        pin_rod(bore, step.end, radius, from_web=True).transform(poses[bore.bodies[0]][:3])
-    )
+    rod = evaluated(way)
     box = np.reshape(rod.bounding_box(), (2, 3))
     for body in sorted([*step.sides[0], *step.sides[1]]):
         solid = solids[body].transform(poses[body][:3])

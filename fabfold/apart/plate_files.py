@@ -6,7 +6,7 @@ import csv
 import io
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,10 @@ from fabfold.apart.plates import Plates, on_plate
 from fabfold.export.render import thumbnail
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.files import write_json, write_text
-from fabfold.joinery.bodies import Joinery
-from fabfold.printing.print_mode import PINS
+from fabfold.joinery.bodies import Joinery, PlacedPin
+from fabfold.joinery.pin_kinds import PINS, PinKind
 from fabfold.tree.fold_tree import FoldTree
+from hinges.hardware import SCREWS
 from hinges.slicer_parts import BAMBU, bambu_plates, bambu_project
 
 __all__ = ["assembly_data", "bill_rows", "remove_plates", "write_bill", "write_plates"]
@@ -180,6 +181,15 @@ def assembly_data(tree: FoldTree, joinery: Joinery, kit: ApartKit) -> dict[str, 
                     "tip_mm": list(pin.tip_mm),
                     "tail_mm": list(pin.tail_mm),
                     "gripped_by": names[pin.owner],
+                    **(
+                        {
+                            "head_diameter_mm": 2 * pin.head_mm,
+                            "head_height_mm": pin.head_height_mm,
+                            "thread_mm": pin.thread_mm,
+                        }
+                        if pin.thread_mm > 0
+                        else {}
+                    ),
                 },
             }
         )
@@ -207,7 +217,7 @@ def bill_rows(
     material : str
         What is printed.
     pin : str
-        Name of the loose pin, of :data:`fabfold.printing.print_mode.PINS`.
+        Name of the loose pin, of :data:`fabfold.joinery.pin_kinds.PINS`.
     magnets : (int, str)
         Number and size of the magnets.
 
@@ -227,10 +237,12 @@ def bill_rows(
         rows.append(("glue", 1, "", "for the magnets"))
     if not joinery.pins:
         return rows
-    what = PINS[pin][1]
+    kind = PINS[pin]
+    if kind.screw:
+        return rows + _screw_rows(joinery.pins, kind)
     lengths = Counter(round(p.length_mm, 1) for p in joinery.pins)
     for length, count in sorted(lengths.items()):
-        rows.append((f"pin, {what}", count, f"{length:g} mm long", "one a hinge"))
+        rows.append((f"pin, {kind.what}", count, f"{length:g} mm long", "one a hinge"))
     bore = max(p.diameter_mm for p in joinery.pins)
     rows += [
         (f"drill or reamer of {bore + 0.2:.2f} mm", 1, "", "for bores that came out too tight"),
@@ -238,6 +250,21 @@ def bill_rows(
         (f"rod of {bore:g} mm", 1, "80 mm long", "pushes pins home"),
     ]
     return rows
+
+
+def _screw_rows(pins: Sequence[PlacedPin], kind: PinKind) -> list[tuple[str, int, str, str]]:
+    """Screws by their length, and what drives them."""
+    screw = SCREWS[kind.screw]
+    lengths = Counter(pin.length_mm for pin in pins)
+    return [
+        *(
+            (f"{kind.what}", count, f"{kind.screw} × {length:g} mm", "one a hinge")
+            for length, count in sorted(lengths.items())
+        ),
+        (kind.tool, 1, "", "drives the screws"),
+        (f"drill of {screw.clear:g} mm", 1, "", "for bores that turn and came out too tight"),
+        (f"drill of {screw.tap:g} mm", 1, "", "for bores that the thread does not go into"),
+    ]
 
 
 def write_bill(

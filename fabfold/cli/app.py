@@ -43,6 +43,7 @@ from fabfold.cli.command_options import (
     PinName,
     PinSlip,
     Pitch,
+    Pose,
     Prefer,
     Print,
     ProfileName,
@@ -55,6 +56,7 @@ from fabfold.cli.command_options import (
     Scheduler,
     Seed,
     Share,
+    Slicer,
     Source,
     TemplateCells,
     TemplateName,
@@ -64,6 +66,7 @@ from fabfold.cli.command_options import (
     Void,
     VoxelMm,
     Workers,
+    number_or_text,
 )
 from fabfold.errors import (
     CheckError,
@@ -136,14 +139,6 @@ def _forget_stdout() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _number(text: str | None) -> float | str | None:
-    """A number where the text is one, else the text."""
-    try:
-        return text if text is None else float(text)
-    except ValueError:
-        return text
-
-
 def _kit(source: str, output: Path | None, quiet: bool, **options: Any) -> Kit:
     from fabfold.cli.console import ConsoleListener
     from fabfold.kit.kit import open_kit
@@ -151,7 +146,7 @@ def _kit(source: str, output: Path | None, quiet: bool, **options: Any) -> Kit:
     for name in ("keep", "protect"):
         options[name] = options[name] or None
     for name in ("prefer", "void", "thicken"):
-        options[name] = _number(options[name])
+        options[name] = number_or_text(options[name])
     if output is None and not (Path(source).is_dir() or source.endswith(".toml")):
         output = Path(f"{Path(source.removeprefix('sample:')).stem}-kit")
     kit = open_kit(source, folder=output, **options)
@@ -177,6 +172,8 @@ def _stage(name: str, summary: str) -> None:
         clearance_mm: ClearanceMm = None,
         print: Print = None,
         pin: PinName = None,
+        pose: Pose = None,
+        slicer: Slicer = None,
         retention: RetentionName = None,
         magnet: MagnetName = None,
         seed: Seed = None,

@@ -37,6 +37,7 @@ __all__ = [
     "PinName",
     "PinSlip",
     "Pitch",
+    "Pose",
     "Prefer",
     "Print",
     "ProfileName",
@@ -49,6 +50,7 @@ __all__ = [
     "Scheduler",
     "Seed",
     "Share",
+    "Slicer",
     "Source",
     "TemplateCells",
     "TemplateName",
@@ -58,6 +60,7 @@ __all__ = [
     "Void",
     "VoxelMm",
     "Workers",
+    "number_or_text",
 ]
 
 Source = Annotated[
@@ -140,8 +143,27 @@ PinName = Annotated[
     str | None,
     typer.Option(
         "--pin",
-        metavar="1.75|2.85|rod-2",
-        help="Pin of bodies that are printed apart: a piece of filament, or of rod. Default: 1.75.",
+        metavar="1.75|2.85|rod-2|m2",
+        help="Pin of bodies that are printed apart: a piece of filament or of rod, or a screw M2. "
+        "Default: 1.75.",
+    ),
+]
+Pose = Annotated[
+    str | None,
+    typer.Option(
+        "--pose",
+        metavar="a|b|auto|N",
+        help="Pose in which a kit is printed in place: the model (a, the default), the box (b), "
+        "after move N of the path, or the one that prints best (auto).",
+    ),
+]
+Slicer = Annotated[
+    str | None,
+    typer.Option(
+        "--slicer",
+        metavar="any|prusa|prusa3|orca|bambu|all",
+        help="Write the 3MF of a kit in place for this slicer too, as one object of named parts in "
+        "the kit's colours. Default: any, which is for Bambu Studio and OrcaSlicer.",
     ),
 ]
 RetentionName = Annotated[
@@ -378,3 +400,11 @@ PinSlip = Annotated[
     float | None,
     typer.Option("--pin-slip", help="Number of the smallest bore that the pin turns in by itself."),
 ]
+
+
+def number_or_text(text: str | None) -> float | str | None:
+    """A number where the text of an option is one, else the text."""
+    try:
+        return text if text is None else float(text)
+    except ValueError:
+        return text

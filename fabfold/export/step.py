@@ -9,6 +9,7 @@ from its mesh, is written again with flat faces only, and then triangle by trian
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -116,6 +117,8 @@ def write_step(
     title: str | None = None,
     colours: NDArray[np.uint8] | None = None,
     progress: Progress | None = None,
+    hardware: Sequence[StepSolid] = (),
+    assembled: Path | None = None,
 ) -> StepFacts:
     """Write the bodies as solids, in mm, shape A; the same input gives the same bytes.
 
@@ -134,11 +137,15 @@ def write_step(
         Colour of each body, sRGB.
     progress : Progress, optional
         Is told which body is written.
+    hardware : sequence of StepSolid
+        What is put into the bodies, for `assembled`.
+    assembled : Path, optional
+        A second file, which holds the bodies and the hardware; it goes where there is none.
 
     Returns
     -------
     StepFacts
-        What was written.
+        What was written to `path`.
 
     Raises
     ------
@@ -163,7 +170,13 @@ def write_step(
         volume += measured
         if level != _LEVELS[0]:
             plain.append(body.name)
-    write_text(path, step_text(solids, title or path.stem, application))
+    title = title or path.stem
+    write_text(path, step_text(solids, title, application))
+    if assembled is not None and hardware:
+        assembled.parent.mkdir(exist_ok=True)
+        write_text(assembled, step_text([*solids, *hardware], f"{title} assembled", application))
+    elif assembled is not None:
+        assembled.unlink(missing_ok=True)
     progress.update(1.0, f"{len(solids)} solids")
     faces = [face for solid in solids for face in solid.brep.faces]
     return StepFacts(

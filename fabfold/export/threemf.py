@@ -57,6 +57,7 @@ def write_3mf(
     layout: Layout = "kit",
     thumbnail: bytes | None = None,
     keep_place: bool = False,
+    coloured_parts: bool = False,
     settings: Callable[[list[int]], Mapping[str, str]] | None = None,
     auxiliaries: Mapping[str, bytes] | None = None,
 ) -> None:
@@ -83,6 +84,9 @@ def write_3mf(
     keep_place : bool
         Whether the bodies stay where they are; otherwise they are moved so that all coordinates
         begin at 0.
+    coloured_parts : bool
+        With the layout "kit": whether PrusaSlicer, where it opens the file as a project, shows each
+        body in its colour, as of an extruder of its own.
     settings : callable, optional
         Files of slicer settings by name, in place of the layout's own; it is given the number of
         each body's object.
@@ -115,7 +119,7 @@ def write_3mf(
             facts={"Title": title, "Application": f"fabfold {__version__}", **(metadata or {})},
             layout=layout,
             owner="fabfold",
-            filaments=False,
+            filaments=coloured_parts,
             closed=True,
             move=(0.0, 0.0, 0.0) if keep_place else (east, north, high),
             thumbnail=thumbnail,

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from fabfold.guide.wording import listed, part_number
 from fabfold.joinery.bodies import Joinery
-from fabfold.printing.print_mode import PINS, PrintMode
+from fabfold.joinery.pin_kinds import PINS
+from fabfold.printing.print_mode import PrintMode
 from fabfold.tree.fold_tree import FoldTree
 
 if TYPE_CHECKING:
@@ -44,10 +45,17 @@ def content_lines(
     lines[0] += "" if mode.apart else " that are printed in place, already joined"
     if joinery.pins:
         total = sum(pin.length_mm for pin in joinery.pins)
-        lines.append(
-            f"{len(joinery.pins)} pins of {PINS[mode.pin][1]}, {total / 10:.0f} cm in all "
-            "(lengths in bom.csv)"
-        )
+        kind = PINS[mode.pin]
+        if kind.screw:
+            lines.append(
+                f"{len(joinery.pins)} screws {kind.screw} × {joinery.pins[0].length_mm:g} mm with "
+                f"a cylinder head, and a {kind.tool}"
+            )
+        else:
+            lines.append(
+                f"{len(joinery.pins)} pins of {kind.what}, {total / 10:.0f} cm in all "
+                "(lengths in bom.csv)"
+            )
     if retention is not None and retention.pairs:
         lines.append(f"{2 * len(retention.pairs)} magnets of {retention.magnet} mm")
     size = joinery.voxel_mm
@@ -89,6 +97,11 @@ def print_lines(mode: PrintMode, joinery: Joinery) -> list[str]:
             "Print it as it lies, as one object. Let it cool, free it from powder or support, and "
             "turn every hinge once to and fro."
         )
+        if mode.pose != "a":
+            lines.append(
+                "It does not come out as the model: the report names the move of the path after "
+                "which it is printed. Go the steps backwards from there to the model."
+            )
     return lines
 
 
@@ -109,8 +122,16 @@ def assembly_lines(joinery: Joinery, kit: ApartKit | None) -> list[str]:
         pin = joinery.pins[step.pin]
         rests = listed([part_number(body) for body in step.sides[0]])
         comes = listed([part_number(body) for body in step.sides[1]])
-        lines.append(
-            f"Bring {comes} to {rests}, and push in a pin of {pin.length_mm:.1f} mm "
-            f"until it stands in part {part_number(pin.owner)}."
-        )
+        owner = part_number(pin.owner)
+        if pin.thread_mm > 0:
+            lines.append(
+                f"Bring {comes} to {rests}, and drive in a screw of {pin.length_mm:g} mm until its "
+                f"head lies on part {owner}; then a quarter turn back, so that the hinge turns "
+                "freely."
+            )
+        else:
+            lines.append(
+                f"Bring {comes} to {rests}, and push in a pin of {pin.length_mm:.1f} mm "
+                f"until it stands in part {owner}."
+            )
     return lines

@@ -53,6 +53,12 @@ class PlacedPin:
         Middle of its other end, mm.
     diameter_mm : float
         Diameter, mm.
+    head_mm : float
+        Radius of the head at its tail, mm; 0 where it has none.
+    head_height_mm : float
+        Height of that head, mm.
+    thread_mm : float
+        Length at its tip that cuts itself into the body that grips it, mm; 0 for a plain pin.
     """
 
     hinge: int
@@ -60,10 +66,13 @@ class PlacedPin:
     tip_mm: tuple[float, float, float]
     tail_mm: tuple[float, float, float]
     diameter_mm: float
+    head_mm: float = 0.0
+    head_height_mm: float = 0.0
+    thread_mm: float = 0.0
 
     @property
     def length_mm(self) -> float:
-        """Length, mm."""
+        """Length without a head, mm."""
         return float(np.linalg.norm(np.subtract(self.tail_mm, self.tip_mm)))
 
 

@@ -2,7 +2,8 @@
 
 A body printed by itself has open bores. At the end where the pin goes in, the two bodies that it
 joins are cleared along the axis; at the other end a thin web with a hole closes the bore, so that
-the pin stops there and a needle pushes it out again.
+the pin stops there and a needle pushes it out again. A screw needs no web: its head is sunk into
+the first knuckle, which is as wide as those that turn, and its thread cuts itself into the last.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from fabfold.errors import GeometryError
 from fabfold.joinery.bodies import BodyMesh, Joinery, PlacedPin
 from fabfold.joinery.booleans import subtract, union
 from fabfold.joinery.cells import as_manifold
+from fabfold.joinery.pin_kinds import SHORT_MM, PinFit
 from fabfold.joinery.soundness import printable_body
 from fabfold.tree.fold_tree import FoldTree
 
@@ -34,6 +36,7 @@ __all__ = [
     "meshes_with_pins",
     "pin_bores",
     "pin_rod",
+    "pin_way",
     "with_pins",
 ]
 
@@ -46,8 +49,6 @@ CHANNEL_MM = 0.025
 #: Web that closes the far end of a bore, and the diameter of the hole through it, mm.
 WEB_MM = 0.8
 PUSH_OUT_MM = 1.0
-#: The pin ends this far inside the barrel, so that nothing sticks out, mm.
-_SHORT_MM = 0.2
 #: The web reaches this far into the wall around the bore, mm.
 _BITE_MM = 0.2
 _CORNERS = 24
@@ -164,7 +165,7 @@ def cylinder_between(
     return rod.transform(np.column_stack([x, np.cross(z, x), z, start]))
 
 
-def entry_channel(bore: PinBore, end: int, joinery: Joinery, slip_mm: float) -> manifold3d.Manifold:
+def entry_channel(bore: PinBore, end: int, joinery: Joinery, fit: PinFit) -> manifold3d.Manifold:
     """What the two bodies of a pin give up beyond its barrel so that it can go in.
 
     Parameters
@@ -175,8 +176,8 @@ def entry_channel(bore: PinBore, end: int, joinery: Joinery, slip_mm: float) -> 
         1 or -1: the end at which the pin goes in.
     joinery : Joinery
         It tells the pin's radius.
-    slip_mm : float
-        How much wider than the pin the loosest bore is, in radius, mm.
+    fit : PinFit
+        How the pin sits; the way is as wide as its loosest bore, or as the pocket of its head.
 
     Returns
     -------
@@ -184,7 +185,7 @@ def entry_channel(bore: PinBore, end: int, joinery: Joinery, slip_mm: float) -> 
         In mm, shape A.
     """
     face = bore.face(end)
-    radius = joinery.pin_radius_mm + slip_mm + CHANNEL_MM
+    radius = max(joinery.pin_radius_mm + fit.slip_mm, fit.pocket_mm) + CHANNEL_MM
     return cylinder_between(face, face + end * PUSHER_MM * bore.axis, radius, outside=True)
 
 
@@ -206,10 +207,8 @@ def barrel_around(bore: PinBore, joinery: Joinery) -> manifold3d.Manifold:
     return cylinder_between(bore.face(-1), bore.face(1), joinery.barrel_radius_mm, outside=True)
 
 
-def pin_rod(
-    bore: PinBore, end: int, radius_mm: float, *, from_web: bool = False
-) -> manifold3d.Manifold:
-    """All the space that a pin and its pusher go through on the way in, in shape A.
+def pin_rod(bore: PinBore, end: int, radius_mm: float) -> manifold3d.Manifold:
+    """The space beyond the barrel that a pin and its pusher go through, in shape A.
 
     Parameters
     ----------
@@ -219,8 +218,6 @@ def pin_rod(
         1 or -1: the end at which the pin goes in.
     radius_mm : float
         Radius of the rod, mm.
-    from_web : bool
-        Whether it begins at the web at the other end, or where the barrel ends.
 
     Returns
     -------
@@ -228,12 +225,43 @@ def pin_rod(
         In mm.
     """
     face = bore.face(end)
-    start = bore.face(-end) + end * WEB_MM * bore.axis if from_web else face
-    return cylinder_between(start, face + end * PUSHER_MM * bore.axis, radius_mm, outside=True)
+    return cylinder_between(face, face + end * PUSHER_MM * bore.axis, radius_mm, outside=True)
+
+
+def pin_way(bore: PinBore, end: int, pin: PlacedPin, fit: PinFit) -> manifold3d.Manifold:
+    """All the space that a placed pin, its head and its pusher go through, in shape A.
+
+    Parameters
+    ----------
+    bore : PinBore
+        The knuckles.
+    end : int
+        1 or -1: the end at which the pin goes in.
+    pin : PlacedPin
+        The pin in its place.
+    fit : PinFit
+        How it sits; where its thread cuts itself in, only the core of the screw counts.
+
+    Returns
+    -------
+    manifold3d.Manifold
+        In mm.
+    """
+    radius, face = pin.diameter_mm / 2, bore.face(end)
+    tip, tail = np.array(pin.tip_mm), np.array(pin.tail_mm)
+    bitten = tip + end * pin.thread_mm * bore.axis
+    parts = [
+        cylinder_between(bitten, tail, radius, outside=True),
+        cylinder_between(tail, face + end * bore.axis, max(radius, pin.head_mm), outside=True),
+        pin_rod(bore, end, max(radius, pin.head_mm)),
+    ]
+    if pin.thread_mm > 0:
+        parts.append(cylinder_between(tip, bitten, radius + fit.grip_mm, outside=False))
+    return union(parts)
 
 
 def with_pins(
-    joinery: Joinery, bores: Sequence[PinBore], ends: Sequence[int], grip_mm: float, slip_mm: float
+    joinery: Joinery, bores: Sequence[PinBore], ends: Sequence[int], fit: PinFit
 ) -> Joinery:
     """Clear each pin's way in, close its other end, and put the pins where they go.
 
@@ -245,9 +273,8 @@ def with_pins(
         Where the pins go.
     ends : sequence of int
         For each, the end at which it goes in: 1 or -1.
-    grip_mm, slip_mm : float
-        How much wider than the pin the bores are, in radius, mm: of the body that grips it, and of
-        the others.
+    fit : PinFit
+        How the pins sit in their bores.
 
     Returns
     -------
@@ -258,31 +285,23 @@ def with_pins(
     ------
     GeometryError
         If a channel cuts a body apart.
+    RecipeError
+        If no screw is sold in a length that fits the hinges.
     """
     cuts: dict[int, list[manifold3d.Manifold]] = {}
     webs: dict[int, list[manifold3d.Manifold]] = {}
     pins = []
     for bore, end in zip(bores, ends, strict=True):
-        channel = entry_channel(bore, end, joinery, slip_mm)
+        channel = entry_channel(bore, end, joinery, fit)
         for body in bore.bodies:
             cuts.setdefault(body, []).append(channel)
-        inner = -end * bore.axis
-        outside, inside = bore.face(-end), bore.face(-end) - WEB_MM * inner
-        plug = cylinder_between(
-            inside, outside, joinery.pin_radius_mm + grip_mm + _BITE_MM, outside=False
-        )
-        hole = cylinder_between(inside - inner, outside + inner, PUSH_OUT_MM / 2, outside=True)
-        webs.setdefault(bore.owner, []).append(plug - hole)
-        tip, tail = inside, bore.face(end) - end * _SHORT_MM * bore.axis
-        pins.append(
-            PlacedPin(
-                bore.hinge,
-                bore.owner,
-                _triple(tip),
-                _triple(tail),
-                2 * joinery.pin_radius_mm,
-            )
-        )
+        if fit.threaded:
+            pin, wide = _screw(joinery, bore, end, fit)
+            cuts[bore.owner].append(wide)
+        else:
+            pin, web = _plain_pin(joinery, bore, end, fit)
+            webs.setdefault(bore.owner, []).append(web)
+        pins.append(pin)
     bodies = []
     for index, mesh in enumerate(joinery.bodies):
         if index not in cuts:
@@ -295,6 +314,49 @@ def with_pins(
             raise GeometryError(f"{mesh.name}: the way of a pin cuts it into {len(parts)} pieces")
         bodies.append(BodyMesh(mesh.name, *printable_body(parts[0], mesh.name, np.zeros(3))))
     return replace(joinery, bodies=tuple(bodies), pins=tuple(pins))
+
+
+def _plain_pin(
+    joinery: Joinery, bore: PinBore, end: int, fit: PinFit
+) -> tuple[PlacedPin, manifold3d.Manifold]:
+    """A pin in its place, and the web with a hole that it stands on."""
+    inner = -end * bore.axis
+    outside, inside = bore.face(-end), bore.face(-end) - WEB_MM * inner
+    plug = cylinder_between(
+        inside, outside, joinery.pin_radius_mm + fit.grip_mm + _BITE_MM, outside=False
+    )
+    hole = cylinder_between(inside - inner, outside + inner, PUSH_OUT_MM / 2, outside=True)
+    tail = bore.face(end) - end * SHORT_MM * bore.axis
+    diameter = 2 * joinery.pin_radius_mm
+    pin = PlacedPin(bore.hinge, bore.owner, _triple(inside), _triple(tail), diameter)
+    return pin, plug - hole
+
+
+def _screw(
+    joinery: Joinery, bore: PinBore, end: int, fit: PinFit
+) -> tuple[PlacedPin, manifold3d.Manifold]:
+    """A screw in its place, and what is cut out of the knuckle that its head is sunk into."""
+    barrel, count, gap = 2 * bore.half_mm, joinery.knuckles, joinery.clearance_mm
+    knuckle = (barrel - (count - 1) * gap) / count
+    radius = joinery.pin_radius_mm
+    length = fit.screw_length(barrel, knuckle, 2 * radius)
+    face, inner = bore.face(end), -end * bore.axis
+    seat = face + fit.sunk_mm * inner
+    pin = PlacedPin(
+        bore.hinge,
+        bore.owner,
+        _triple(seat + length * inner),
+        _triple(seat),
+        2 * radius,
+        fit.head_mm,
+        fit.head_height_mm,
+        round(fit.sunk_mm + length - (barrel - knuckle), 6),
+    )
+    pocket = cylinder_between(seat, face - inner, fit.pocket_mm, outside=True)
+    wide = cylinder_between(
+        seat - inner, face + (knuckle + gap / 2) * inner, radius + fit.slip_mm, outside=True
+    )
+    return pin, pocket + wide
 
 
 def _triple(point: Floats) -> tuple[float, float, float]:
@@ -317,9 +379,13 @@ def meshes_with_pins(joinery: Joinery) -> list[tuple[Floats, NDArray[np.int32]]]
     """
     meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     for pin in joinery.pins:
-        solid = cylinder_between(
-            np.array(pin.tip_mm), np.array(pin.tail_mm), pin.diameter_mm / 2, outside=True
-        )
+        tip, tail = np.array(pin.tip_mm), np.array(pin.tail_mm)
+        solid = cylinder_between(tip, tail, pin.diameter_mm / 2, outside=True)
+        if pin.head_mm > 0:
+            out = (tail - tip) / pin.length_mm
+            solid += cylinder_between(
+                tail, tail + pin.head_height_mm * out, pin.head_mm, outside=True
+            )
         made = solid.to_mesh64()
         vertices, faces = meshes[pin.owner]
         points = np.asarray(made.vert_properties, dtype=np.float64)[:, :3]

@@ -39,8 +39,10 @@ __all__ = ["MAGNETS", "DiscMagnet", "MagnetPair", "Retention", "free_hinges", "h
 
 Floats = NDArray[np.float64]
 
-#: Room around a magnet, in diameter and in depth, and the wall around its pocket, mm.
-_ROOM_MM, _DEEP_MM, _WALL_MM = 0.2, 0.2, 0.8
+#: A magnet lies so far below the mouth of its pocket, mm.
+DEEP_MM = 0.2
+#: Room around a magnet, in diameter, and the wall around its pocket, mm.
+_ROOM_MM, _WALL_MM = 0.2, 0.8
 #: Places on a face that are tried, in voxel sides from its middle.
 _PLACES = (0.0, 0.22, -0.22)
 #: Speeds below this count as none; a hinge turns at most at 1.
@@ -326,7 +328,7 @@ def _places(
     """The first place on a meeting with room for a pocket and its wall on both sides."""
     u, v = across(meeting.normal)
     radius = (magnet.diameter_mm + _ROOM_MM) / 2 + _WALL_MM
-    deep = magnet.thick_mm + _DEEP_MM + _WALL_MM
+    deep = magnet.thick_mm + DEEP_MM + _WALL_MM
     for i in _PLACES:
         for j in _PLACES:
             place = meeting.middle + joinery.voxel_mm * (i * u + j * v)
@@ -358,7 +360,7 @@ def _with_pockets(
 ) -> Joinery:
     """The bodies with a pocket for every magnet."""
     tools: dict[int, list[manifold3d.Manifold]] = {}
-    radius, deep = (magnet.diameter_mm + _ROOM_MM) / 2, magnet.thick_mm + _DEEP_MM
+    radius, deep = (magnet.diameter_mm + _ROOM_MM) / 2, magnet.thick_mm + DEEP_MM
     for pair in pairs:
         for body, point, inward in zip(pair.bodies, pair.points_mm, pair.inwards, strict=True):
             mouth, into = np.array(point), np.array(inward)

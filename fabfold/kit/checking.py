@@ -10,6 +10,7 @@ from fabfold.kit.stages import BuiltTree
 from fabfold.printing.body_checks import check_bodies
 from fabfold.printing.checks import Check
 from fabfold.printing.print_mode import PrintMode
+from fabfold.printing.print_pose import PrintPose, print_pose
 from fabfold.printing.profiles import Profile
 from fabfold.progress import Progress
 from fabfold.proof.box_play import box_play
@@ -26,6 +27,8 @@ STEP_DEG = 1.0
 GAP_STEP_DEG = 10.0
 #: Most of the kit's volume that may be carved away so that cells pass each other, per cent.
 CARVED_LIMIT = 5.0
+#: Most surface over a gap that filament may fuse: so little breaks free by hand, mm².
+FUSED_LIMIT_MM2 = 20.0
 #: Volume that bodies may share in A or B before it is more than rounding, mm³.
 _OVERLAP_MM3 = 1e-3
 
@@ -79,8 +82,10 @@ def run_checks(built: BuiltTree, mode: PrintMode, progress: Progress) -> list[Ch
     ]
     if joinery.rounded_cells:
         checks.append(_rounded(built))
+    pose = None
     if built.apart is None:
-        checks.append(_lies(mode))
+        pose = print_pose(tree, motion, joinery, profile, mode.pose)
+        checks.append(_lies(mode, pose))
     else:
         from fabfold.apart.apart_checks import check_apart
 
@@ -89,7 +94,7 @@ def run_checks(built: BuiltTree, mode: PrintMode, progress: Progress) -> list[Ch
         checks.append(_held(built, built.retention))
     checks += _play(built, mode)
     progress.update(0.1, "printability")
-    checks += check_bodies(joinery, tree, motion, profile, progress)
+    checks += check_bodies(joinery, tree, motion, profile, progress, pose)
     progress.update(0.5, "every degree of the path")
     checks += _sampled(built, profile)
     progress.update(0.8, "replay in MuJoCo")
@@ -117,21 +122,20 @@ def run_checks(built: BuiltTree, mode: PrintMode, progress: Progress) -> list[Ch
     return checks
 
 
-def _lies(mode: PrintMode) -> Check:
-    """Whether the printer can make the closed kit as one object."""
+def _lies(mode: PrintMode, pose: PrintPose) -> Check:
+    """Whether the printer can make the kit as one object in its pose."""
     able = mode.profile.in_place
+    if able:
+        return Check("prints as it lies", 1.0, 1.0, "", True, f"{mode.why}; {pose.figures}")
     return Check(
         name="prints as it lies",
-        figure=float(able),
-        limit=1.0,
-        unit="",
-        ok=able,
-        note=(
-            mode.why
-            if able
-            else f"{mode.profile.name} fuses the gap under every face of the closed kit; print it "
-            "body by body with --print apart, or take a powder profile such as mjf-pa12"
-        ),
+        figure=pose.under_mm2,
+        limit=FUSED_LIMIT_MM2,
+        unit="mm²",
+        ok=pose.under_mm2 <= FUSED_LIMIT_MM2,
+        note=f"{mode.profile.name} fuses gaps under faces, and so many mm² hang over nothing but "
+        f"the gap; {pose.figures}. Print it body by body with --print apart, look for another pose "
+        "with --pose auto, or take a powder profile such as mjf-pa12",
     )
 
 

@@ -10,6 +10,7 @@ from fabfold.export.stl import stl_bytes
 from fabfold.export.weld import printable_mesh
 from fabfold.files import json_text, sha256_of
 from fabfold.kit.stages import BuiltTree
+from fabfold.kit.step_process import HARDWARE
 from fabfold.kit.writing import remove_named
 from fabfold.printing.checks import Check
 from fabfold.recipe.recipe import Recipe
@@ -99,8 +100,8 @@ def delivered_digests(folder: Path) -> dict[str, str]:
         By their names.
     """
     return {
-        path.name: sha256_of(path)
-        for path in sorted(folder.iterdir())
+        path.relative_to(folder).as_posix(): sha256_of(path)
+        for path in sorted([*folder.iterdir(), *(folder / HARDWARE).glob("*")])
         if path.is_file() and path.name.endswith(_COUNTED)
     }
 

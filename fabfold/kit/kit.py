@@ -280,8 +280,8 @@ class Kit(StageRunner):
                 with EarlyKit(target, self.recipe, mode, self.listener) as self._early:
                     self.fold()
             built = self.join()
-            path, tree = target / f"{self.recipe.name}.step", built.planned.tree
-            with StepProcess(path, built.joinery, tree, beside=self.workers != 1) as step:
+            path = target / f"{self.recipe.name}.step"
+            with StepProcess(path, built, beside=self.workers != 1) as step:
                 checks = self.check()
                 with self._open_progress("export") as progress:
                     write_kit(
@@ -329,10 +329,10 @@ class Kit(StageRunner):
         from fabfold.printing.profiles import load_profile
 
         recipe = self.recipe
-        magnet = recipe.magnet if recipe.retention == "magnet" else ""
         return print_mode(
-            load_profile(recipe.profile), recipe.print, recipe.pin, recipe.clearance_mm, magnet
-        )
+            load_profile(recipe.profile), recipe.print, recipe.pin, recipe.clearance_mm,
+            recipe.magnet if recipe.retention == "magnet" else "", recipe.pose,
+        )  # fmt: skip
 
     @property
     def kernel_seconds(self) -> float:

@@ -104,7 +104,7 @@ def build(
     if mode.apart:
         from fabfold.apart.apart_kit import prepare_apart
 
-        joinery, apart = prepare_apart(planned.tree, planned.motion, joinery, profile, progress)
+        joinery, apart = prepare_apart(planned.tree, planned.motion, joinery, mode, progress)
     if mode.magnet:
         from fabfold.joinery.magnets import MAGNETS, hold_shut
 

@@ -13,11 +13,22 @@ from typing import IO
 from fabfold.child_process import end_with_parent, module_call
 from fabfold.errors import GeometryError
 from fabfold.export.colours import body_colours
+from fabfold.export.hardware_brep import hardware_solids
 from fabfold.export.step import write_step
 from fabfold.joinery.bodies import Joinery
+from fabfold.joinery.magnets import Retention
+from fabfold.kit.stages import BuiltTree
 from fabfold.tree.fold_tree import FoldTree
 
-__all__ = ["StepProcess"]
+__all__ = ["HARDWARE", "StepProcess", "assembled_path"]
+
+#: Folder of the files that hold more than the printed bodies.
+HARDWARE = "hardware"
+
+
+def assembled_path(step: Path) -> Path:
+    """Where the file with bodies, pins and magnets is, beside that of the bodies alone."""
+    return step.parent / HARDWARE / f"{step.stem}-assembled.step"
 
 
 class StepProcess:
@@ -31,10 +42,9 @@ class StepProcess:
     ----------
     path : Path
         File to write, ending in ``.step``; its name names the assembly.
-    joinery : Joinery
-        The printed bodies in shape A.
-    tree : FoldTree
-        The bodies and hinges.
+    built : BuiltTree
+        The printed bodies in shape A. With magnets or pins there is a second file that holds all,
+        in the folder :data:`HARDWARE`.
     beside : bool
         False writes it in this process, once it is waited for.
 
@@ -42,15 +52,19 @@ class StepProcess:
     --------
     ::
 
-        with StepProcess(folder / "car.step", joinery, tree) as step:
+        with StepProcess(folder / "car.step", built) as step:
             checks = check_everything()
             step.wait()
     """
 
     def __init__(
-        self, path: Path, joinery: Joinery, tree: FoldTree, *, beside: bool = True
+        self,
+        path: Path,
+        built: BuiltTree,
+        *,
+        beside: bool = True,
     ) -> None:
-        self._work = (path, joinery, tree)
+        self._work = (path, built.joinery, built.planned.tree, built.retention)
         self._beside = beside
         self._process: subprocess.Popen[bytes] | None = None
         self._said: IO[bytes] | None = None
@@ -103,8 +117,16 @@ class StepProcess:
         self._said.close()
 
 
-def _write(path: Path, joinery: Joinery, tree: FoldTree) -> None:
-    write_step(path, joinery, tree, title=path.stem, colours=body_colours(tree))
+def _write(path: Path, joinery: Joinery, tree: FoldTree, retention: Retention | None) -> None:
+    write_step(
+        path,
+        joinery,
+        tree,
+        title=path.stem,
+        colours=body_colours(tree),
+        hardware=hardware_solids(joinery, tree, retention),
+        assembled=assembled_path(path),
+    )
 
 
 if __name__ == "__main__":

@@ -12,6 +12,11 @@ from fabfold.export.glb import write_glb
 from fabfold.export.render import png_bytes, thumbnail
 from fabfold.export.report import write_report
 from fabfold.export.sketch import picture_of_tree
+from fabfold.export.slicer_files import (
+    SLICER_ENDINGS,
+    remove_slicer_files,
+    write_slicer_files,
+)
 from fabfold.export.stl import write_stl
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.export.urdf import write_urdf
@@ -21,16 +26,17 @@ from fabfold.kit.box_closure import BoxClosure
 from fabfold.kit.figure_pictures import figure_pictures
 from fabfold.kit.guide_files import PICTURE, write_guide
 from fabfold.kit.stages import BuiltTree, PlannedTree
+from fabfold.kit.step_process import assembled_path
 from fabfold.lattice.template import Template
 from fabfold.printing.checks import Check
 from fabfold.printing.print_mode import PrintMode
+from fabfold.printing.print_pose import posed_kit, print_pose
 from fabfold.progress import Progress, ProgressPart
 from fabfold.recipe.recipe import Recipe
 from fabfold.search.pareto import Solution
 from fabfold.solid.closed_solid import Solid
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.version import __version__
-from hinges.slicer_parts import BAMBU
 
 if TYPE_CHECKING:
     from fabfold.kit.kit import Kit
@@ -50,7 +56,7 @@ __all__ = [
 
 
 #: Endings of the files that are called by the name of the kit.
-_NAMED = (".3mf", "-bambu.3mf", "-flat.3mf", ".step", ".urdf")
+_NAMED = (".3mf", "-flat.3mf", ".step", ".urdf", *SLICER_ENDINGS.values())
 
 
 def remove_named(folder: Path, names: Iterable[str]) -> None:
@@ -66,6 +72,7 @@ def remove_named(folder: Path, names: Iterable[str]) -> None:
     for name in names:
         for ending in _NAMED:
             (folder / f"{name}{ending}").unlink(missing_ok=True)
+        assembled_path(folder / f"{name}.step").unlink(missing_ok=True)
 
 
 def write_stage(kit: Kit, stage: str, result: Any) -> None:
@@ -288,25 +295,32 @@ def write_printable(
         beside["Bill of Materials/bom.csv"] = (folder / "bom.csv").read_bytes()
     if built.apart is not None:
         write_plates(folder, name, tree, joinery, built.apart, colours, metadata, beside)
+        remove_slicer_files(folder, name, [SLICER_ENDINGS["bambu"]])
     else:
         remove_plates(folder)
+        printed = joinery
+        if mode.pose != "a":
+            pose = print_pose(tree, built.planned.motion, joinery, mode.profile, mode.pose)
+            printed = posed_kit(joinery, pose)
+            metadata["Description"] += f"; {pose.figures}"
         title = f"{name} folds into {tree.template.name}"
-        picture = thumbnail([(body.vertices, body.faces) for body in joinery.bodies], colours)
+        picture = thumbnail([(body.vertices, body.faces) for body in printed.bodies], colours)
         write_3mf(
             folder / f"{name}.3mf",
-            joinery,
+            printed,
             title=title,
             metadata=metadata,
             colours=colours,
             thumbnail=picture,
         )
-        write_3mf(
-            folder / f"{name}-bambu.3mf",
-            joinery,
+        write_slicer_files(
+            folder,
+            name,
+            printed,
+            recipe.slicer,
             title=title,
-            metadata={**metadata, "Application": BAMBU},
+            metadata=metadata,
             colours=colours,
-            layout="assembly",
             thumbnail=picture,
             auxiliaries=beside,
         )

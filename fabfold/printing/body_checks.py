@@ -10,8 +10,10 @@ from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.cells import solids_of
 from fabfold.printing.checks import Check
+from fabfold.printing.escape_checks import check_escape
 from fabfold.printing.gap_checks import check_gaps
 from fabfold.printing.overhang_checks import check_overhang
+from fabfold.printing.print_pose import PrintPose, posed_kit
 from fabfold.printing.profiles import Profile
 from fabfold.printing.size_checks import check_sizes
 from fabfold.printing.topology_checks import check_topology
@@ -28,6 +30,7 @@ def check_bodies(
     motion: Motion,
     profile: Profile,
     progress: Progress | None = None,
+    pose: PrintPose | None = None,
 ) -> list[Check]:
     """Check all bodies of a kit for printing.
 
@@ -43,6 +46,8 @@ def check_bodies(
         Limits of the printer and material.
     progress : Progress, optional
         Is told how far the checks are.
+    pose : PrintPose, optional
+        How the kit is printed in one piece, see :func:`fabfold.printing.size_checks.check_sizes`.
 
     Returns
     -------
@@ -63,8 +68,11 @@ def check_bodies(
     checks += check_gaps(joinery.bodies, solids, profile, reach, hinged)
     progress.update(0.6, "walls")
     checks += check_walls(joinery, solids, profile)
+    progress.update(0.8, "ways out")
+    placed = None if pose is None else posed_kit(joinery, pose).bodies
+    checks += check_escape(joinery.bodies, profile, placed)
     progress.update(0.9, "sizes and overhangs")
-    checks += check_sizes(joinery, tree, motion, profile)
+    checks += check_sizes(joinery, tree, motion, profile, pose)
     checks.append(check_overhang(joinery, profile))
     progress.update(1.0, f"{len(checks)} checks")
     return checks

@@ -15,6 +15,7 @@ from fabfold.joinery.cells import solids_of
 from fabfold.joinery.soundness import piece_of_vertices
 from fabfold.meshes import compact, face_normals, mesh_volume, weld
 from fabfold.printing.checks import Check
+from fabfold.printing.escape_checks import check_escape
 from fabfold.printing.gap_checks import check_gaps
 from fabfold.printing.profiles import Profile
 from fabfold.printing.standing import centre_of_mass, stands_over
@@ -114,6 +115,8 @@ def check_file(path: Path, profile: Profile, progress: Progress) -> list[Check]:
     except GeometryError as error:
         # Nothing below can be measured on a mesh that is no solid.
         return [*checks, Check("parts are solids", 1.0, 0.0, "parts", False, str(error))]
+    progress.update(0.3, "ways out")
+    checks += check_escape(parts, profile, parts)
     progress.update(0.4, "gaps between parts")
     checks += check_gaps(parts, solids, profile, _REACH_MM)
     progress.update(0.6, "walls")

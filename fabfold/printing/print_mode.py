@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from fabfold.errors import RecipeError
+from fabfold.joinery.pin_kinds import PINS, PinFit
 from fabfold.printing.profiles import Profile
 
 if TYPE_CHECKING:
     from hinges.hardware import LoosePin
 
-__all__ = ["PINS", "PrintMode", "print_mode"]
-
-#: Pins that a kit can be joined with: name, diameter in mm, and what one buys.
-PINS: Final[dict[str, tuple[float, str]]] = {
-    "1.75": (1.75, "filament of 1.75 mm"),
-    "2.85": (2.85, "filament of 2.85 mm"),
-    "rod-2": (2.0, "round rod of 2 mm"),
-}
+__all__ = ["PrintMode", "print_mode"]
 
 
 @dataclass(frozen=True)
@@ -34,10 +28,12 @@ class PrintMode:
     profile : Profile
         Printer and material, with the clearance and the smallest gap of this way.
     pin : str
-        Name of the loose pin, of :data:`PINS`.
+        Name of the loose pin, of :data:`fabfold.joinery.pin_kinds.PINS`.
     magnet : str
         Name of the magnets that hold the box shut, of :data:`fabfold.joinery.magnets.MAGNETS`;
         empty where nothing does.
+    pose : str
+        Pose in which it is printed in place, as of :func:`fabfold.printing.print_pose.print_pose`.
     """
 
     apart: bool
@@ -45,6 +41,7 @@ class PrintMode:
     profile: Profile
     pin: str
     magnet: str = ""
+    pose: str = "a"
 
     @property
     def name(self) -> str:
@@ -62,8 +59,20 @@ class PrintMode:
             return None
         from hinges.hardware import LoosePin
 
-        fit = self.profile.apart
-        return LoosePin(PINS[self.pin][0], fit.grip_mm, fit.slip_mm, entry="none")
+        fit = self.pin_fit
+        return LoosePin(
+            PINS[self.pin].diameter_mm,
+            fit.grip_mm,
+            fit.slip_mm,
+            entry="none",
+            pocket=fit.pocket_mm,
+        )
+
+    @property
+    def pin_fit(self) -> PinFit:
+        """How loose pins sit in their bores."""
+        apart = self.profile.apart
+        return PINS[self.pin].fit(apart.grip_mm, apart.slip_mm)
 
     def require_hinge(self, voxel_mm: float) -> None:
         """Refuse a size of voxels that holds no hinge.
@@ -76,12 +85,17 @@ class PrintMode:
         Raises
         ------
         RecipeError
-            With the smallest voxel that would do.
+            With the smallest voxel that would do; or if no screw is sold in the length that it
+            wants.
         """
         from fabfold.joinery.sizes import hinge_size
 
-        clearance = self.profile.clearance_mm
-        hinge_size(voxel_mm, clearance, gap_mm=self.face_gap_mm, pin=self.loose_pin())
+        clearance, pin = self.profile.clearance_mm, self.loose_pin()
+        size = hinge_size(voxel_mm, clearance, gap_mm=self.face_gap_mm, pin=pin)
+        if pin is not None and self.pin_fit.threaded:
+            barrel = voxel_mm - 2 * size.reach_mm
+            knuckle = (barrel - (size.knuckles - 1) * clearance) / size.knuckles
+            self.pin_fit.screw_length(barrel, knuckle, pin.diameter)
 
 
 def print_mode(
@@ -90,6 +104,7 @@ def print_mode(
     pin: str = "1.75",
     clearance_mm: float | None = None,
     magnet: str = "",
+    pose: str = "a",
 ) -> PrintMode:
     """Choose how a kit is printed.
 
@@ -100,11 +115,13 @@ def print_mode(
     asked : {"auto", "in-place", "apart"}
         What the recipe asks for; auto leaves it to the profile.
     pin : str
-        Name of the loose pin, of :data:`PINS`.
+        Name of the loose pin, of :data:`fabfold.joinery.pin_kinds.PINS`.
     clearance_mm : float, optional
         Clearance in the hinges, mm, in place of the profile's.
     magnet : str
         Name of the magnets that hold the box shut; empty for none.
+    pose : str
+        Pose in which it is printed in place.
 
     Returns
     -------
@@ -131,4 +148,4 @@ def print_mode(
             f"at least; give more than that (its own clearance is {gaps.clearance_mm:g} mm)"
         )
     gapped = profile.model_copy(update={"clearance_mm": clearance, "min_gap_mm": gaps.min_gap_mm})
-    return PrintMode(apart, why, gapped, pin, magnet)
+    return PrintMode(apart, why, gapped, pin, magnet, pose)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fabfold.errors import RecipeError
-from fabfold.printing.print_mode import PINS
+from fabfold.joinery.pin_kinds import PINS
 from fabfold.printing.profiles import DEFAULT_PROFILE, load_profile
 from fabfold.toml_files import nearest
 
@@ -32,7 +32,7 @@ def make_coupon(
     around : float, optional
         What a first coupon gave, mm: a second one in finer steps about it.
     pin : str
-        Name of the loose pin that its bores are for, of :data:`fabfold.printing.print_mode.PINS`.
+        Name of the loose pin that its bores are for, of :data:`fabfold.joinery.pin_kinds.PINS`.
 
     Returns
     -------
@@ -49,6 +49,11 @@ def make_coupon(
 
     if pin not in PINS:
         raise RecipeError(f"--pin {pin}: {nearest(pin, list(PINS))}")
+    if PINS[pin].screw:
+        raise RecipeError(
+            f"--pin {pin}: a coupon's bores are for plain pins, and a screw cuts its own thread; "
+            "leave --pin out"
+        )
     known = load_profile(profile or DEFAULT_PROFILE)
     values = coupon_clearances(clearances, around)
     title = f"Hinge coupon, {known.name}"
@@ -56,7 +61,7 @@ def make_coupon(
         bed = None if known.bed_mm is None else known.bed_mm[:2]
         wall = max(0.8, known.min_wall_mm)
         return write_coupon(
-            path, values, wall_mm=wall, pin_mm=PINS[pin][0], title=title, bed_mm=bed
+            path, values, wall_mm=wall, pin_mm=PINS[pin].diameter_mm, title=title, bed_mm=bed
         )
     except HingeError as error:
         raise RecipeError(str(error)) from None

@@ -97,6 +97,9 @@ class Profile(BaseModel):
     max_overhang_deg : float or None
         Steepest overhang that prints without support, degrees from the vertical; None where no
         support is needed.
+    escape_mm : float or None
+        Least diameter of a hole through which powder or resin comes out of a hollow, mm; None where
+        the process leaves nothing in hollows.
     in_place : bool
         Whether the closed kit can be printed as one object: the process leaves open the gap under
         every face.
@@ -120,6 +123,7 @@ class Profile(BaseModel):
     min_gap_mm: Annotated[float, Field(gt=0.0, le=5.0)]
     min_wall_mm: Annotated[float, Field(gt=0.0, le=20.0)]
     max_overhang_deg: Annotated[float, Field(ge=0.0, le=90.0)] | None = None
+    escape_mm: Length | None = None
     in_place: bool
     bed_mm: tuple[Length, Length, Length] | None = None
     sources: tuple[str, ...] = ()

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
 from fabfold.printing.checks import Check
+from fabfold.printing.print_pose import PrintPose
 from fabfold.printing.profiles import Profile
 from fabfold.tree.fold_tree import FoldTree
 
@@ -16,7 +17,13 @@ __all__ = ["check_sizes"]
 Floats = NDArray[np.float64]
 
 
-def check_sizes(joinery: Joinery, tree: FoldTree, motion: Motion, profile: Profile) -> list[Check]:
+def check_sizes(
+    joinery: Joinery,
+    tree: FoldTree,
+    motion: Motion,
+    profile: Profile,
+    pose: PrintPose | None = None,
+) -> list[Check]:
     """Check the smallest body and the build volume, and report the material.
 
     Parameters
@@ -29,6 +36,9 @@ def check_sizes(joinery: Joinery, tree: FoldTree, motion: Motion, profile: Profi
         The folding path; its number of moves is reported.
     profile : Profile
         Limits of the printer and material.
+    pose : PrintPose, optional
+        How the kit is printed in one piece; without it the model as it came, or each body by
+        itself where the profile prints them apart.
 
     Returns
     -------
@@ -67,16 +77,18 @@ def check_sizes(joinery: Joinery, tree: FoldTree, motion: Motion, profile: Profi
         ),
     ]
     if profile.bed_mm is not None:
-        checks.append(_check_fit(joinery, profile.in_place, np.array(profile.bed_mm)))
+        checks.append(_check_fit(joinery, profile.in_place, np.array(profile.bed_mm), pose))
     return checks
 
 
-def _check_fit(joinery: Joinery, in_place: bool, bed_mm: Floats) -> Check:
+def _check_fit(joinery: Joinery, in_place: bool, bed_mm: Floats, pose: PrintPose | None) -> Check:
     """Whether the closed kit, or each body apart, fits into a build volume (3,)."""
     low = np.min([body.vertices.min(axis=0) for body in joinery.bodies], axis=0)
     high = np.max([body.vertices.max(axis=0) for body in joinery.bodies], axis=0)
     spans: list[tuple[str, Floats]] = [("the closed kit", np.asarray(high - low, dtype=float))]
-    if not in_place:
+    if pose is not None:
+        spans = [(f"the kit as {pose.name}", pose.size_mm)] if pose.move else spans
+    elif not in_place:
         # Printed apart, the largest body decides.
         spans = [(body.name, np.ptp(body.vertices, axis=0)) for body in joinery.bodies]
     bed = np.sort(bed_mm)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fabfold.joinery.bodies import BodyMesh, Joinery
+from fabfold.joinery.pin_kinds import HEAD_ROOM_MM
 from fabfold.printing.checks import Check
 from fabfold.printing.profiles import Profile
 from fabfold.printing.thickness import ray_thickness, surface_area
@@ -48,8 +49,10 @@ def check_walls(
 
 def _hinge_wall(joinery: Joinery, profile: Profile) -> Check:
     if joinery.face_gap_mm is not None:  # a round bore for a loose pin
-        ring = joinery.barrel_radius_mm - joinery.pin_radius_mm - profile.apart.slip_mm
-        around = "the bore of"
+        bore = joinery.pin_radius_mm + profile.apart.slip_mm
+        head = max((pin.head_mm for pin in joinery.pins), default=0.0)
+        ring = joinery.barrel_radius_mm - max(bore, head + HEAD_ROOM_MM if head else 0.0)
+        around = "the head of a screw as" if head else "the bore of"
     else:
         # At 45 degrees the mouth of a recess is 0.414 clearances wider than the foot of its cone.
         cone = joinery.pin_radius_mm + (np.sqrt(2.0) - 1.0) * joinery.clearance_mm

@@ -60,8 +60,8 @@ class Recipe(BaseModel):
         Field(description="in-place as one object, apart body by body; auto: as the profile can"),
     ] = "auto"
     pin: Annotated[
-        Literal["1.75", "2.85", "rod-2"],
-        Field(description="loose pin of bodies printed apart: filament 1.75 or 2.85, rod-2"),
+        Literal["1.75", "2.85", "rod-2", "m2"],
+        Field(description="loose pin of bodies printed apart: filament 1.75 or 2.85, rod-2, m2"),
     ] = "1.75"
     retention: Annotated[
         Literal["none", "magnet"], Field(description="what holds the box shut: none, or magnet")
@@ -69,6 +69,17 @@ class Recipe(BaseModel):
     magnet: Annotated[
         Literal["3x1", "4x2", "5x2"], Field(description="disc magnets, diameter x thickness in mm")
     ] = "3x1"
+    pose: Annotated[
+        str,
+        Field(
+            pattern=r"^(a|b|auto|[0-9]{1,4})$",
+            description="printed in place as the model (a), the box (b), after move N, or auto",
+        ),
+    ] = "a"
+    slicer: Annotated[
+        Literal["any", "prusa", "prusa3", "orca", "bambu", "all"],
+        Field(description="whose 3MF to write beside NAME.3mf; any: Bambu Studio and OrcaSlicer"),
+    ] = "any"
     seed: Annotated[int, Field(ge=0, lt=2**31, description="seed of every random choice")] = 1
     effort: Annotated[
         Literal["quick", "normal", "thorough"], Field(description="how long the search goes on")

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from fabfold.errors import FabfoldError
+from fabfold.joinery.pin_kinds import PINS
 from fabfold.joinery.sizes import MIN_WALL_MM, hinge_size
 from fabfold.printing.print_mode import print_mode
 from fabfold.printing.profiles import load_profile, profile_names
@@ -130,7 +131,7 @@ class SizePanel:
         self._voxel = gui.add_slider("voxel, mm", 8.0, 60.0, 0.5, 20.0)
         self._own = gui.add_checkbox("own clearance", False)
         self._clearance = gui.add_slider("clearance, mm", 0.1, 1.0, 0.01, 0.3)
-        self._pin = gui.add_dropdown("loose pin", ("1.75", "2.85", "rod-2"), initial_value="1.75")
+        self._pin = gui.add_dropdown("loose pin", tuple(PINS), initial_value="1.75")
         self._told = gui.add_markdown("")
         gui.add_button("Take this size").on_click(lambda _: self._take())
         for control in (self._profile, self._voxel, self._own, self._clearance, self._pin):
