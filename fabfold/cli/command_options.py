@@ -21,6 +21,7 @@ __all__ = [
     "Json",
     "Keep",
     "KeepWeight",
+    "MagnetFit",
     "MagnetName",
     "Method",
     "ObjectName",
@@ -35,6 +36,7 @@ __all__ = [
     "ProfileName",
     "Protect",
     "Quiet",
+    "RetentionInA",
     "RetentionName",
     "Rotation",
     "Rounds",
@@ -140,8 +142,26 @@ RetentionName = Annotated[
     str | None,
     typer.Option(
         "--retention",
-        metavar="none|magnet",
-        help="What holds the box shut: pairs of disc magnets, as many as it takes. Default: none.",
+        metavar="none|magnet|friction|magnet+friction",
+        help="What holds the box shut: pairs of disc magnets, as many as it takes; pins that both "
+        "bodies grip (printed apart), in hinges that move; or both. Default: none.",
+    ),
+]
+RetentionInA = Annotated[
+    bool | None,
+    typer.Option(
+        "--retention-in-a/--retention-in-b",
+        help="Magnets hold the model too, before it is folded. Default: the box only.",
+        show_default=False,
+    ),
+]
+MagnetFit = Annotated[
+    str | None,
+    typer.Option(
+        "--magnet-fit",
+        metavar="glued|enclosed",
+        help="Magnets are glued into open pockets, or laid in while the print pauses at heights "
+        "that are told. Default: glued.",
     ),
 ]
 MagnetName = Annotated[

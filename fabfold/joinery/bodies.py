@@ -53,6 +53,8 @@ class PlacedPin:
         Middle of its other end, mm.
     diameter_mm : float
         Diameter, mm.
+    tight : bool
+        Whether the body that turns on it grips it too, so that the hinge rubs.
     """
 
     hinge: int
@@ -60,6 +62,7 @@ class PlacedPin:
     tip_mm: tuple[float, float, float]
     tail_mm: tuple[float, float, float]
     diameter_mm: float
+    tight: bool = False
 
     @property
     def length_mm(self) -> float:

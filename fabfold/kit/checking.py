@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fabfold.joinery.loose_pins import meshes_with_pins
-from fabfold.joinery.magnets import Retention
+from fabfold.kit.retention_report import retention_checks
 from fabfold.kit.stages import BuiltTree
 from fabfold.printing.body_checks import check_bodies
 from fabfold.printing.checks import Check
@@ -86,7 +86,7 @@ def run_checks(built: BuiltTree, mode: PrintMode, progress: Progress) -> list[Ch
 
         checks += check_apart(joinery, built.apart)
     if built.retention is not None:
-        checks.append(_held(built, built.retention))
+        checks += retention_checks(built, built.retention)
     checks += _play(built, mode)
     progress.update(0.1, "printability")
     checks += check_bodies(joinery, tree, motion, profile, progress)
@@ -132,24 +132,6 @@ def _lies(mode: PrintMode) -> Check:
             else f"{mode.profile.name} fuses the gap under every face of the closed kit; print it "
             "body by body with --print apart, or take a powder profile such as mjf-pa12"
         ),
-    )
-
-
-def _held(built: BuiltTree, retention: Retention) -> Check:
-    """How many hinges do not move when the box is shut."""
-    hinges = built.planned.tree.hinges
-    free = [hinges[index].name for index in retention.free_after]
-    note = f"{len(retention.pairs)} pairs of {retention.magnet} mm magnets; without them "
-    note += f"{len(retention.free_before)} hinges move"
-    if free:
-        note += f". Held by friction only: {', '.join(free)}"
-    return Check(
-        name="hinges held shut",
-        figure=float(len(hinges) - len(free)),
-        limit=None,
-        unit=f"of {len(hinges)} hinges",
-        ok=True,
-        note=note,
     )
 
 
@@ -204,13 +186,11 @@ def _rounded(built: BuiltTree) -> Check:
 def _sampled(built: BuiltTree, profile: Profile) -> list[Check]:
     """The second opinion on the path, by another library."""
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
+    meshes = meshes_with_pins(joinery, tight=False)
     seen = sample_path(
         tree.to_json(joinery.voxel_mm, joinery.origin_mm),
         motion.to_json(),
-        {
-            body.name: mesh
-            for body, mesh in zip(joinery.bodies, meshes_with_pins(joinery), strict=True)
-        },
+        {body.name: mesh for body, mesh in zip(joinery.bodies, meshes, strict=True)},
         step_deg=STEP_DEG,
         gap_step_deg=GAP_STEP_DEG,
     )

@@ -17,7 +17,7 @@ from fabfold.voxels.voxel_model import Voxels
 
 if TYPE_CHECKING:
     from fabfold.apart.apart_kit import ApartKit
-    from fabfold.joinery.magnets import Retention
+    from fabfold.joinery.box_hold import Retention
     from fabfold.printing.print_mode import PrintMode
 
 __all__ = ["BuiltTree", "PlannedTree", "build", "build_first"]
@@ -47,7 +47,7 @@ class BuiltTree:
     apart : ApartKit or None
         Order of assembly and plates of a kit that is printed body by body.
     retention : Retention or None
-        What holds the box shut, where that was asked for.
+        What holds the kit shut, where that was asked for.
     """
 
     planned: PlannedTree
@@ -88,9 +88,10 @@ def build(
     """
     from fabfold.joinery.build import build_bodies
     from fabfold.joinery.loose_pins import meshes_with_pins
+    from fabfold.kit.holding import hold_kit
     from fabfold.proof.certify import certify, certify_orders
 
-    profile, apart, retention = mode.profile, None, None
+    profile, apart = mode.profile, None
     joinery = build_bodies(
         planned.voxels,
         planned.tree,
@@ -105,12 +106,10 @@ def build(
         from fabfold.apart.apart_kit import prepare_apart
 
         joinery, apart = prepare_apart(planned.tree, planned.motion, joinery, profile, progress)
-    if mode.magnet:
-        from fabfold.joinery.magnets import MAGNETS, hold_shut
-
-        progress.update(None, "places for magnets")
-        joinery, retention = hold_shut(planned.tree, planned.motion, joinery, MAGNETS[mode.magnet])
-    tree, motion, meshes = planned.tree, planned.motion, meshes_with_pins(joinery)
+    tree, motion = planned.tree, planned.motion
+    joinery, apart, retention = hold_kit(tree, motion, joinery, apart, mode, progress)
+    # A pin that both bodies grip touches them on purpose, and lies inside its barrel.
+    meshes = meshes_with_pins(joinery, tight=False)
     certificate = certify(
         tree,
         motion,
@@ -130,6 +129,12 @@ def build(
         progress=progress,
         volume=np.array([body.volume for body in joinery.bodies]),
     )
+    tight = [tree.hinges[pin.hinge].name for pin in joinery.pins if pin.tight]
+    if tight:
+        certificate["geometry"] += (
+            f"; the pins of {', '.join(tight)}, which both of their bodies grip, are left out: "
+            "they lie inside their barrels"
+        )
     motion = replace(motion, certificate=certificate)
     return BuiltTree(replace(planned, motion=motion), joinery, refused, apart, retention)
 
