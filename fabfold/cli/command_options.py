@@ -44,6 +44,7 @@ __all__ = [
     "Scheduler",
     "Seed",
     "Share",
+    "Skin",
     "Source",
     "TemplateCells",
     "TemplateName",
@@ -168,6 +169,15 @@ MagnetName = Annotated[
     str | None,
     typer.Option(
         "--magnet", metavar="3x1|4x2|5x2", help="Disc magnets for --retention. Default: 3x1."
+    ),
+]
+Skin = Annotated[
+    str | None,
+    typer.Option(
+        "--skin",
+        metavar="model|lattice",
+        help="Bodies with the model's surface, or plain blocks of cells with chamfered edges "
+        "(lattice): exact in CAD, and small files. Default: model.",
     ),
 ]
 Seed = Annotated[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fabfold.joinery.lattice_skin import blocks_of
 from fabfold.joinery.loose_pins import meshes_with_pins
 from fabfold.kit.retention_report import retention_checks
 from fabfold.kit.stages import BuiltTree
@@ -138,10 +139,11 @@ def _lies(mode: PrintMode) -> Check:
 def _play(built: BuiltTree, mode: PrintMode) -> list[Check]:
     """How far the outer faces of the box wander by the play of all hinges; for information."""
     planned = built.planned
+    voxels = blocks_of(planned.voxels) if mode.blocks else planned.voxels
     play = box_play(
         planned.tree,
         built.joinery,
-        planned.voxels.subvoxels,
+        voxels.subvoxels,
         planned.motion.angles_deg[-1],
         mode.loose_pin(),
     )

@@ -52,7 +52,14 @@ def mode_of(recipe: Recipe) -> PrintMode:
         enclosed=recipe.magnet_fit == "enclosed",
     )
     profile = load_profile(recipe.profile)
-    return print_mode(profile, recipe.print, recipe.pin, recipe.clearance_mm, hold)
+    return print_mode(
+        profile,
+        recipe.print,
+        recipe.pin,
+        recipe.clearance_mm,
+        hold,
+        blocks=recipe.skin == "lattice",
+    )
 
 
 def hold_kit(

@@ -87,19 +87,22 @@ def build(
         If its bodies come too near to each other on the path, or fit no plate.
     """
     from fabfold.joinery.build import build_bodies
+    from fabfold.joinery.lattice_skin import CHAMFER_SHARE, blocks_of
     from fabfold.joinery.loose_pins import meshes_with_pins
     from fabfold.kit.holding import hold_kit
     from fabfold.proof.certify import certify, certify_orders
 
     profile, apart = mode.profile, None
     joinery = build_bodies(
-        planned.voxels,
+        blocks_of(planned.voxels) if mode.blocks else planned.voxels,
         planned.tree,
         planned.motion,
         voxel_mm=voxel_mm,
         clearance_mm=profile.clearance_mm,
         face_gap_mm=mode.face_gap_mm,
         pin=mode.loose_pin(),
+        wall_mm=profile.min_wall_mm,
+        chamfer_mm=CHAMFER_SHARE * voxel_mm if mode.blocks else 0.0,
         progress=progress,
     )
     if mode.apart:

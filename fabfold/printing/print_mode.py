@@ -93,6 +93,8 @@ class PrintMode:
         Name of the loose pin, of :data:`PINS`.
     hold : Hold
         What holds the kit shut.
+    blocks : bool
+        Whether bodies are blocks of cells, without the model's surface.
     """
 
     apart: bool
@@ -100,6 +102,7 @@ class PrintMode:
     profile: Profile
     pin: str
     hold: Hold = Hold()
+    blocks: bool = False
 
     @property
     def name(self) -> str:
@@ -145,6 +148,8 @@ def print_mode(
     pin: str = "1.75",
     clearance_mm: float | None = None,
     hold: Hold | None = None,
+    *,
+    blocks: bool = False,
 ) -> PrintMode:
     """Choose how a kit is printed.
 
@@ -160,6 +165,8 @@ def print_mode(
         Clearance in the hinges, mm, in place of the profile's.
     hold : Hold, optional
         What is to hold the kit shut; nothing by default.
+    blocks : bool
+        Whether bodies are blocks of cells, without the model's surface.
 
     Returns
     -------
@@ -189,4 +196,4 @@ def print_mode(
     gapped = profile.model_copy(update={"clearance_mm": clearance, "min_gap_mm": gaps.min_gap_mm})
     hold = hold or Hold()
     hold.check(profile, apart=apart)
-    return PrintMode(apart, why, gapped, pin, hold)
+    return PrintMode(apart, why, gapped, pin, hold, blocks)

@@ -79,6 +79,10 @@ class Recipe(BaseModel):
         Literal["glued", "enclosed"],
         Field(description="magnets: glued in, or enclosed while the print pauses"),
     ] = "glued"
+    skin: Annotated[
+        Literal["model", "lattice"],
+        Field(description="the model's surface, or lattice: blocks of cells with chamfered edges"),
+    ] = "model"
     seed: Annotated[int, Field(ge=0, lt=2**31, description="seed of every random choice")] = 1
     effort: Annotated[
         Literal["quick", "normal", "thorough"], Field(description="how long the search goes on")
