@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.joinery.barrel_sweeps import lighter_sides
+from fabfold.joinery.barrel_sweeps import descendants
 from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.joinery.booleans import union
@@ -56,7 +56,8 @@ class PinFriction:
     torque_nmm : float
         Torque against which one pin then holds, N mm.
     needed_nmm : float
-        Largest torque of the weight that any of these hinges carries in the box, N mm.
+        Largest torque of the weight about any of these hinges in the box, N mm: of either of its
+        sides, whatever is up.
     """
 
     hinges: tuple[int, ...]
@@ -110,7 +111,7 @@ def pin_friction(
     Returns
     -------
     PinFriction
-        Strain, torque, and what the weight of the lighter side asks for at most.
+        Strain, torque, and what the weight asks for at most.
     """
     from hinges.retention import STRAIN_LIMITS
 
@@ -134,7 +135,7 @@ def pin_friction(
 def _weight_torque(
     tree: FoldTree, joinery: Joinery, angles_deg: Floats, hinges: Sequence[int], density: float
 ) -> float:
-    """Largest torque of the lighter side's weight about any of these hinges, whatever is up."""
+    """Largest torque of the weight of a side about any of these hinges, whatever is up."""
     if not hinges:
         return 0.0
     poses = poses_in_mm(tree, joinery, angles_deg)
@@ -145,16 +146,18 @@ def _weight_torque(
             for body, pose in zip(joinery.bodies, poses, strict=True)
         ]
     )
-    sides = lighter_sides(tree, volume)
+    carried = descendants(tree)
     torques = []
     for index in hinges:
         hinge, pose = tree.hinges[index], poses[tree.hinges[index].parent]
         point = np.asarray(joinery.origin_mm) + joinery.voxel_mm * np.asarray(hinge.point)
         axis = pose[:3, :3] @ np.asarray(hinge.direction, dtype=float)
-        share = volume * sides[index]
-        arm = share @ middles / share.sum() - (pose[:3, :3] @ point + pose[:3, 3])
-        across = float(np.linalg.norm(np.cross(axis, arm)))
-        torques.append(share.sum() * density * 1e-6 * _GRAVITY * across)
+        place = pose[:3, :3] @ point + pose[:3, 3]
+        for side in (carried[index], ~carried[index]):
+            share = volume * side
+            arm = share @ (middles - place) / share.sum()
+            across = float(np.linalg.norm(np.cross(axis, arm)))
+            torques.append(share.sum() * density * 1e-6 * _GRAVITY * across)
     return float(max(torques))
 
 
