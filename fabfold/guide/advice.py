@@ -135,7 +135,7 @@ def assembly_lines(joinery: Joinery, kit: ApartKit | None) -> list[str]:
         rests = listed([part_number(body) for body in step.sides[0]])
         comes = listed([part_number(body) for body in step.sides[1]])
         lines.append(
-            f"Bring {comes} to {rests}, and push in a pin of {pin.length_mm:.1f} mm "
-            f"until it stands in part {part_number(pin.owner)}."
+            f"Bring {comes} to {rests}, and push in a {'friction pin' if pin.tight else 'pin'} of "
+            f"{pin.length_mm:.1f} mm until it stands in part {part_number(pin.owner)}."
         )
     return lines

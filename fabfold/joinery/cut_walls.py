@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = ["with_cut_walls"]
 
+#: Walls are thicker than asked for by this, mm, so that none is thinner once it is rounded.
+_SPARE_MM = 0.01
 #: The material is looked at so far below the cut face, mm.
 _BELOW_MM = 0.002
 #: Strips narrower than twice this share of the wall are left as they are.
@@ -56,6 +58,7 @@ def with_cut_walls(
         Volume of what they add, mm³.
     """
     walls: list[manifold3d.Manifold] = []
+    wall = wall_mm + _SPARE_MM
     added = 0.0
     for body in tree.bodies:
         if not body.voxels:
@@ -68,7 +71,7 @@ def with_cut_walls(
         slabs = [
             slab
             for normal in FACES
-            for slab in _slabs(material, cells, normal, voxel_mm, inset_mm, wall_mm)
+            for slab in _slabs(material, cells, normal, voxel_mm, inset_mm, wall)
         ]
         if slabs:
             walls += slabs

@@ -103,7 +103,7 @@ def hold_kit(
     else:
         moving = tuple(hinges_that_move(tree, motion, joinery))
         retention = Retention(moving, moving)
-    if hold.friction and apart is not None:
+    if hold.friction and apart is not None and retention.free_after:
         joinery, apart, retention = _with_friction(tree, motion, joinery, apart, mode, retention)
     return joinery, apart, retention
 
