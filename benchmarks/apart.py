@@ -23,9 +23,10 @@ from fabfold.apart.pin_replay import replay_assembly
 from fabfold.apart.plates import lay_out_plates, on_plate
 from fabfold.errors import FabfoldError
 from fabfold.export.threemf import write_3mf
+from fabfold.joinery.box_hold import hold_by_magnets
 from fabfold.joinery.build import build_bodies
 from fabfold.joinery.loose_pins import meshes_with_pins, pin_bores, with_pins
-from fabfold.joinery.magnets import MAGNETS, hold_shut
+from fabfold.joinery.magnets import MAGNETS, Pocket
 from fabfold.kit.kit import open_kit
 from fabfold.printing.print_mode import print_mode
 from fabfold.printing.profiles import load_profile
@@ -94,7 +95,7 @@ def row_of(folder: Path, slicing: bool) -> dict[str, Any]:
             tree, motion, meshes_with_pins(joinery), 20.0, joinery.origin_mm, fit.min_gap_mm
         )
         lap("proof")
-        _, kept = hold_shut(tree, motion, joinery, MAGNETS["3x1"])
+        _, kept = hold_by_magnets(tree, motion, joinery, Pocket(MAGNETS["3x1"]))
         lap("magnets")
     except FabfoldError as error:
         return {**row, "error": str(error)}

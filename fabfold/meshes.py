@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "box_triangles",
+    "centre_of_mass",
     "compact",
     "drop_collapsed",
     "face_areas",
@@ -221,6 +222,23 @@ def mesh_volume(vertices: NDArray[np.float64], faces: NDArray[np.integer[Any]]) 
         In the cube of the unit of `vertices`; negative if the mesh is inside out.
     """
     return float(triple_products(vertices[faces] - vertices.mean(axis=0)).sum() / 6)
+
+
+def centre_of_mass(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Centre of mass of closed meshes of one density.
+
+    Parameters
+    ----------
+    corners : (f, 3, 3) float64 array
+        Corners of all triangles, counter-clockwise seen from outside, in any unit.
+
+    Returns
+    -------
+    (3,) float64 array
+        In that unit.
+    """
+    volumes = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    return np.asarray((volumes[:, None] * corners.sum(axis=1) / 4).sum(axis=0) / volumes.sum())
 
 
 def box_triangles(

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from fabfold.joinery.body_poses import poses_in_mm
+from fabfold.joinery.box_hold import Retention, hold_by_magnets
 from fabfold.joinery.cells import as_manifold
+from fabfold.joinery.free_motions import free_hinges
 from fabfold.joinery.loose_pins import cylinder_between
-from fabfold.joinery.magnets import MAGNETS, Retention, free_hinges, hold_shut
+from fabfold.joinery.magnets import MAGNETS, Pocket
 from fabfold.kit.kit import Kit
 
 
@@ -17,7 +19,7 @@ from fabfold.kit.kit import Kit
 def held(bar_kit):
     built = bar_kit.join()
     tree, motion = built.planned.tree, built.planned.motion
-    joinery, retention = hold_shut(tree, motion, built.joinery, MAGNETS["3x1"])
+    joinery, retention = hold_by_magnets(tree, motion, built.joinery, Pocket(MAGNETS["3x1"]))
     return tree, motion, built.joinery, joinery, retention
 
 
@@ -78,7 +80,7 @@ def test_pockets_have_their_size_and_a_wall_behind_and_around(held):
 
 def test_the_same_again_and_through_json(held, bar_kit):
     tree, motion, before, _, retention = held
-    _, again = hold_shut(tree, motion, before, MAGNETS["3x1"])
+    _, again = hold_by_magnets(tree, motion, before, Pocket(MAGNETS["3x1"]))
     assert again == retention
     assert Retention.from_json(json.loads(json.dumps(retention.to_json()))) == retention
 

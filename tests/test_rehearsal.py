@@ -11,7 +11,9 @@ import pytest
 
 from fabfold.fold.motion import motion_of
 from fabfold.joinery.bodies import BodyMesh, Joinery
-from fabfold.joinery.magnets import MagnetPair, Retention
+from fabfold.joinery.box_hold import Retention
+from fabfold.joinery.friction_pins import PinFriction
+from fabfold.joinery.magnets import MagnetPair
 from fabfold.proof.box_play import box_play
 from fabfold.proof.rehearsal import rehearse
 from fabfold.proof.replay import course
@@ -61,11 +63,21 @@ def test_magnets_hold_what_they_can_and_no_more():
     tree, motion, joinery = kit()
     half = 0.5 * SIDE - 0.25
     pair = MagnetPair((0, 1), ((0.0, half, 0.0), (60.0, half, 0.0)), ((0, -1.0, 0), (0, -1.0, 0)))
-    held = Retention("3x1", (pair,), (0,), ())
+    held = Retention((0,), (), "3x1", pairs=(pair,))
     light = rehearse(tree, motion, joinery, 1.0, retention=held)
     assert light.opens_deg["-y"] < 5
     heavy = rehearse(tree, motion, joinery, 60.0, retention=held)
     assert heavy.opens_deg["-y"] > 20
+
+
+def test_friction_pins_hold_up_to_their_torque():
+    tree, motion, joinery = kit()
+    weight = joinery.bodies[1].volume / 1e6 * 9.81 * np.hypot(20.0, 10.0)  # N mm, at most
+    pins = PinFriction((0,), 0.1, 0.008, 0.007, 1.5 * weight, weight)
+    held = Retention((0,), (0,), friction=pins)
+    assert rehearse(tree, motion, joinery, 1.0, retention=held).opens_deg["-y"] < 5
+    weak = replace(held, friction=replace(pins, torque_nmm=0.1 * weight))
+    assert rehearse(tree, motion, joinery, 1.0, retention=weak).opens_deg["-y"] > 20
 
 
 def test_motors_stop_at_each_end_and_hurry_between():

@@ -20,6 +20,7 @@ from fabfold.export.render import thumbnail
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.files import write_json, write_text
 from fabfold.joinery.bodies import Joinery, PlacedPin
+from fabfold.joinery.box_hold import Retention
 from fabfold.joinery.pin_kinds import PINS, PinKind
 from fabfold.tree.fold_tree import FoldTree
 from hinges.hardware import SCREWS
@@ -206,7 +207,7 @@ def assembly_data(tree: FoldTree, joinery: Joinery, kit: ApartKit) -> dict[str, 
 
 
 def bill_rows(
-    joinery: Joinery, material: str, pin: str, magnets: tuple[int, str] = (0, "")
+    joinery: Joinery, material: str, pin: str, retention: Retention | None = None
 ) -> list[tuple[str, int, str, str]]:
     """What a kit is made of and what it takes to put it together.
 
@@ -218,8 +219,8 @@ def bill_rows(
         What is printed.
     pin : str
         Name of the loose pin, of :data:`fabfold.joinery.pin_kinds.PINS`.
-    magnets : (int, str)
-        Number and size of the magnets.
+    retention : Retention, optional
+        The magnets.
 
     Returns
     -------
@@ -231,10 +232,12 @@ def bill_rows(
         (f"{material or 'material'}, printed", len(joinery.bodies), f"{volume:.1f} cm³ in all",
          "bodies; with infill it takes less"),
     ]  # fmt: skip
-    if magnets[0]:
-        size = " × ".join(magnets[1].split("x")) + " mm"
-        rows.append(("disc magnet, neodymium", magnets[0], size, "hold the box shut"))
-        rows.append(("glue", 1, "", "for the magnets"))
+    if retention is not None and retention.pairs:
+        size = " × ".join(retention.magnet.split("x")) + " mm"
+        count = 2 * len(retention.pairs)
+        rows.append(("disc magnet, neodymium", count, size, "hold the box shut"))
+        if not retention.skin_mm:
+            rows.append(("glue", 1, "", "for the magnets"))
     if not joinery.pins:
         return rows
     kind = PINS[pin]
@@ -268,11 +271,15 @@ def _screw_rows(pins: Sequence[PlacedPin], kind: PinKind) -> list[tuple[str, int
 
 
 def write_bill(
-    folder: Path, joinery: Joinery, material: str, pin: str, magnets: tuple[int, str] = (0, "")
+    folder: Path,
+    joinery: Joinery,
+    material: str,
+    pin: str,
+    retention: Retention | None = None,
 ) -> None:
     """Write ``bom.csv``; parameters as of :func:`bill_rows`."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["item", "count", "size", "what for"])
-    writer.writerows(bill_rows(joinery, material, pin, magnets))
+    writer.writerows(bill_rows(joinery, material, pin, retention))
     write_text(folder / "bom.csv", text.getvalue())

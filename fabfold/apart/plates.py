@@ -14,9 +14,9 @@ from fabfold.export.threemf import posed
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.loose_pins import PinBore
 from fabfold.lattice.rotations import ROTATIONS
-from fabfold.meshes import vector_areas
+from fabfold.meshes import centre_of_mass, vector_areas
 from fabfold.printing.profiles import Profile
-from fabfold.printing.standing import centre_of_mass, stands_over
+from fabfold.printing.standing import stands_over
 
 __all__ = ["RIM_MM", "LaidBody", "Plates", "lay_out", "lay_out_plates", "on_plate"]
 

@@ -32,6 +32,7 @@ from fabfold.cli.command_options import (
     KeepWeight,
     MadeAround,
     MadeWith,
+    MagnetFit,
     MagnetName,
     Method,
     ObjectName,
@@ -49,6 +50,7 @@ from fabfold.cli.command_options import (
     ProfileName,
     Protect,
     Quiet,
+    RetentionInA,
     RetentionName,
     Rotation,
     Rounds,
@@ -56,6 +58,7 @@ from fabfold.cli.command_options import (
     Scheduler,
     Seed,
     Share,
+    Skin,
     Slicer,
     Source,
     TemplateCells,
@@ -68,6 +71,7 @@ from fabfold.cli.command_options import (
     Workers,
     number_or_text,
 )
+from fabfold.cli.model_file_check import check_model_file, is_model_file
 from fabfold.errors import (
     CheckError,
     FabfoldError,
@@ -175,7 +179,10 @@ def _stage(name: str, summary: str) -> None:
         pose: Pose = None,
         slicer: Slicer = None,
         retention: RetentionName = None,
+        retention_in_a: RetentionInA = None,
         magnet: MagnetName = None,
+        magnet_fit: MagnetFit = None,
+        skin: Skin = None,
         seed: Seed = None,
         effort: Effort = None,
         rounds: Rounds = None,
@@ -207,8 +214,8 @@ def _stage(name: str, summary: str) -> None:
         options = dict(locals())
         for key in ("name", "summary", "pareto", "as_json", "fit_bed"):
             options.pop(key, None)
-        if name == "check" and output is None and _is_model_file(source):
-            _check_file(Path(source), profile, as_json=as_json, quiet=quiet)
+        if name == "check" and output is None and is_model_file(source):
+            check_model_file(Path(source), profile, as_json=as_json, quiet=quiet)
             return
         if as_json and name != "check":
             raise RecipeError(f"--json goes with 'fabfold check', not with {name!r}")
@@ -250,27 +257,6 @@ def _checks(kit: Kit, stage: str) -> list[Check]:
     if stage not in ("check", "export"):
         return []
     return [*kit.check(), *(kit.delivered() if stage == "check" else [])]
-
-
-def _is_model_file(source: str) -> bool:
-    path = Path(source)
-    return path.is_file() and path.suffix != ".toml"
-
-
-def _check_file(path: Path, profile: str | None, *, as_json: bool, quiet: bool) -> None:
-    """Check any file for a printer, without making a kit of it."""
-    from fabfold.cli.console import ConsoleListener, show_checks
-    from fabfold.printing.file_checks import check_file
-    from fabfold.printing.profiles import DEFAULT_PROFILE, load_profile
-    from fabfold.progress import SilentListener
-
-    listener = SilentListener() if quiet or as_json else ConsoleListener()
-    chosen = load_profile(profile or DEFAULT_PROFILE)
-    with listener.stage("check") as progress:
-        checks = check_file(path, chosen, progress)
-    show_checks(checks, {"file": path.name, "profile": chosen.name}, as_json=as_json)
-    if not all(check.ok for check in checks):
-        raise typer.Exit(CheckError.exit_code)
 
 
 def _show_pareto(kit: Kit, stage: str) -> None:

@@ -26,6 +26,7 @@ __all__ = [
     "KeepWeight",
     "MadeAround",
     "MadeWith",
+    "MagnetFit",
     "MagnetName",
     "Method",
     "ObjectName",
@@ -43,6 +44,7 @@ __all__ = [
     "ProfileName",
     "Protect",
     "Quiet",
+    "RetentionInA",
     "RetentionName",
     "Rotation",
     "Rounds",
@@ -50,6 +52,7 @@ __all__ = [
     "Scheduler",
     "Seed",
     "Share",
+    "Skin",
     "Slicer",
     "Source",
     "TemplateCells",
@@ -170,14 +173,41 @@ RetentionName = Annotated[
     str | None,
     typer.Option(
         "--retention",
-        metavar="none|magnet",
-        help="What holds the box shut: pairs of disc magnets, as many as it takes. Default: none.",
+        metavar="none|magnet|friction|magnet+friction",
+        help="What holds the box shut: pairs of disc magnets, as many as it takes; pins that both "
+        "bodies grip (printed apart), in hinges that move; or both. Default: none.",
+    ),
+]
+RetentionInA = Annotated[
+    bool | None,
+    typer.Option(
+        "--retention-in-a/--retention-in-b",
+        help="Magnets hold the model too, before it is folded. Default: the box only.",
+        show_default=False,
+    ),
+]
+MagnetFit = Annotated[
+    str | None,
+    typer.Option(
+        "--magnet-fit",
+        metavar="glued|enclosed",
+        help="Magnets are glued into open pockets, or laid in while the print pauses at heights "
+        "that are told. Default: glued.",
     ),
 ]
 MagnetName = Annotated[
     str | None,
     typer.Option(
         "--magnet", metavar="3x1|4x2|5x2", help="Disc magnets for --retention. Default: 3x1."
+    ),
+]
+Skin = Annotated[
+    str | None,
+    typer.Option(
+        "--skin",
+        metavar="model|lattice",
+        help="Bodies with the model's surface, or plain blocks of cells with chamfered edges "
+        "(lattice): exact in CAD, and small files. Default: model.",
     ),
 ]
 Seed = Annotated[

@@ -10,7 +10,8 @@ from fabfold.export.body_brep import Brep, BrepEdge, Face
 from fabfold.export.steptext import StepSolid
 from fabfold.export.surfaces import Axis, Plane, Round
 from fabfold.joinery.bodies import Joinery, PlacedPin
-from fabfold.joinery.magnets import DEEP_MM, MAGNETS, Retention
+from fabfold.joinery.box_hold import Retention
+from fabfold.joinery.magnets import DEEP_MM, MAGNETS
 from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["hardware_solids", "turned_brep"]
@@ -122,14 +123,14 @@ def hardware_solids(
         metal = pin.diameter_mm not in (1.75, 2.85)  # what filament is sold in
         name = f"{'screw' if pin.thread_mm > 0 else 'pin'}-{number}"
         solids.append(StepSolid(name, _pin(pin), _STEEL if metal else _FILAMENT))
-    if retention is not None:
+    if retention is not None and retention.pairs:
         magnet = MAGNETS[retention.magnet]
         for index, pair in enumerate(retention.pairs):
             for pole, mouth, inwards in zip(
                 ("north", "south"), pair.points_mm, pair.inwards, strict=True
             ):
                 into = np.array(inwards)
-                face = np.array(mouth) + DEEP_MM * into
+                face = np.array(mouth) + (retention.skin_mm or DEEP_MM) * into
                 disc = [(magnet.diameter_mm / 2, magnet.thick_mm)]
                 made = _between(face, face + magnet.thick_mm * into, disc)
                 solids.append(StepSolid(f"magnet-{index:02d}-{pole}-out", made, _MAGNET))

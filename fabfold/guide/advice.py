@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fabfold.guide.wording import listed, part_number
@@ -12,7 +13,8 @@ from fabfold.tree.fold_tree import FoldTree
 
 if TYPE_CHECKING:
     from fabfold.apart.apart_kit import ApartKit
-    from fabfold.joinery.magnets import Retention
+    from fabfold.guide.pauses import PrintPause
+    from fabfold.joinery.box_hold import Retention
 
 __all__ = ["WAY_BACK", "assembly_lines", "content_lines", "print_lines"]
 
@@ -37,7 +39,7 @@ def content_lines(
     mode : PrintMode
         How it is printed.
     retention : Retention or None
-        The magnets, where there are any.
+        The magnets and friction pins, where there are any.
     """
     links = sum(not len(body.voxels) for body in tree.bodies)
     plates = f", {links} of them link plates" if links else ""
@@ -57,14 +59,20 @@ def content_lines(
                 "(lengths in bom.csv)"
             )
     if retention is not None and retention.pairs:
-        lines.append(f"{2 * len(retention.pairs)} magnets of {retention.magnet} mm")
+        fit = "laid in while the print pauses" if retention.skin_mm else "glued in"
+        lines.append(f"{2 * len(retention.pairs)} magnets of {retention.magnet} mm, {fit}")
+    if retention is not None and retention.friction is not None and retention.friction.hinges:
+        lines.append(
+            f"friction pins: {len(retention.friction.hinges)} of the pins; both of their parts "
+            "grip them, so that these hinges stay where they are let go"
+        )
     size = joinery.voxel_mm
     shape = " × ".join(f"{side * size:g}" for side in tree.template.shape)
     lines.append(f"closed, it measures {shape} mm")
     return lines
 
 
-def print_lines(mode: PrintMode, joinery: Joinery) -> list[str]:
+def print_lines(mode: PrintMode, joinery: Joinery, pauses: Sequence[PrintPause] = ()) -> list[str]:
     """How to print it, a line each.
 
     Parameters
@@ -73,6 +81,8 @@ def print_lines(mode: PrintMode, joinery: Joinery) -> list[str]:
         How it is printed, with its profile.
     joinery : Joinery
         The bodies, with their clearance.
+    pauses : sequence of PrintPause
+        At which heights magnets are laid in.
     """
     profile = mode.profile
     lines = [
@@ -102,7 +112,22 @@ def print_lines(mode: PrintMode, joinery: Joinery) -> list[str]:
                 "It does not come out as the model: the report names the move of the path after "
                 "which it is printed. Go the steps backwards from there to the model."
             )
-    return lines
+    return lines + [_pause_line(pause) for pause in pauses]
+
+
+def _pause_line(pause: PrintPause) -> str:
+    """One pause: where, and which magnets are laid in."""
+    start = "Pause" if pause.plate is None else f"Plate {pause.plate}: pause"
+    laid = [
+        f"{pole} pole towards the face with the small hole in part "
+        + listed([part_number(body) for body in bodies])
+        for pole, bodies in (("north", pause.north), ("south", pause.south))
+        if bodies
+    ]
+    return (
+        f"{start} at z = {pause.z_mm:g} mm, before the first layer above it, and lay magnets "
+        f"in: {'; '.join(laid)}."
+    )
 
 
 def assembly_lines(joinery: Joinery, kit: ApartKit | None) -> list[str]:
@@ -131,7 +156,7 @@ def assembly_lines(joinery: Joinery, kit: ApartKit | None) -> list[str]:
             )
         else:
             lines.append(
-                f"Bring {comes} to {rests}, and push in a pin of {pin.length_mm:.1f} mm "
-                f"until it stands in part {owner}."
+                f"Bring {comes} to {rests}, and push in a {'friction pin' if pin.tight else 'pin'} "
+                f"of {pin.length_mm:.1f} mm until it stands in part {owner}."
             )
     return lines

@@ -14,10 +14,12 @@ from fabfold.export.render import Image, render
 from fabfold.export.shading import corner_normals
 from fabfold.fold.motion import Motion
 from fabfold.guide.fold_steps import FoldStep, fold_steps, gathered, grouped
+from fabfold.guide.magnet_pictures import MagnetPicture, magnet_pictures
 from fabfold.guide.step_drawing import StepPicture, draw_step
 from fabfold.guide.step_views import LEAST_SEEN, StepView, step_views
 from fabfold.guide.wording import step_text
 from fabfold.joinery.bodies import Joinery
+from fabfold.joinery.box_hold import Retention
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.fold_tree import FoldTree
 
@@ -104,6 +106,8 @@ class Manual:
         Each part by itself, in the order of their numbers.
     names : tuple of str
         What the files call each part.
+    magnets : tuple of MagnetPicture
+        Where magnets go; empty where there are none.
     """
 
     title: str
@@ -116,6 +120,7 @@ class Manual:
     end: Image
     parts: tuple[Image, ...]
     names: tuple[str, ...]
+    magnets: tuple[MagnetPicture, ...] = ()
 
 
 def plan_steps(
@@ -170,6 +175,7 @@ def draw_manual(
     contents: Sequence[str],
     advice: Sequence[str],
     assembly: Sequence[str] = (),
+    retention: Retention | None = None,
     progress: Progress | None = None,
 ) -> Manual:
     """Draw all pictures of a manual.
@@ -192,6 +198,8 @@ def draw_manual(
         Colour of each body, sRGB.
     contents, advice, assembly : sequence of str
         See :class:`Manual`.
+    retention : Retention, optional
+        Magnets that are drawn.
     progress : Progress, optional
         Hears of every step.
 
@@ -234,4 +242,5 @@ def draw_manual(
         ),
         parts=tuple(parts),
         names=tuple(body.name for body in joinery.bodies),
+        magnets=tuple(magnet_pictures(joinery, retention, plan.stand)),
     )

@@ -8,6 +8,7 @@ from html import escape
 
 from fabfold.export.render import Image, jpeg_bytes
 from fabfold.guide.advice import WAY_BACK
+from fabfold.guide.magnet_pictures import POLES
 from fabfold.guide.manual import Manual, ManualStep
 
 __all__ = ["manual_html"]
@@ -68,6 +69,17 @@ def _parts(manual: Manual) -> str:
     )
 
 
+def _magnets(manual: Manual) -> str:
+    if not manual.magnets:
+        return ""
+    pictures = "".join(
+        f"<li>{_image(picture.image, f'Magnets of part {picture.body + 1}')}"
+        f"<strong>{picture.body + 1}</strong></li>"
+        for picture in manual.magnets
+    )
+    return f'<h2>The magnets</h2><p>{escape(POLES)}</p><ul class="parts">{pictures}</ul>'
+
+
 def manual_html(manual: Manual) -> str:
     """The manual as a page with nothing outside it.
 
@@ -92,7 +104,7 @@ def manual_html(manual: Manual) -> str:
         f"{_image(manual.cover, 'As it is printed, half-way, and folded', 'cover')}"
         f"{_list('What is in the box', manual.contents)}{_list('Printing', manual.advice)}"
         f'<h2>The parts</h2><ul class="parts">{_parts(manual)}</ul>'
-        f"{_list('Putting it together', manual.assembly, 'ol')}"
+        f"{_magnets(manual)}{_list('Putting it together', manual.assembly, 'ol')}"
         "<h2>Folding</h2><p>Hold what is light. Turn what is dark along the arrow, as far as the "
         "number says; the dashed outline shows where it ends. Where a step has more than one "
         "colour, each is a turn by itself, in any order. The line of dashes and dots is the "

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 from fabfold.export.render import Image, jpeg_bytes
 from fabfold.guide.advice import WAY_BACK
 from fabfold.guide.fonts import font_file
+from fabfold.guide.magnet_pictures import POLES
 from fabfold.guide.manual import Manual, ManualStep
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ def manual_pdf(manual: Manual, paper: str = "a4") -> bytes:
     _cover(pdf, manual)
     _before(pdf, manual)
     _parts(pdf, manual)
+    if manual.magnets:
+        _magnets(pdf, manual)
     per_page = _COLUMNS * _ROWS
     for start in range(0, len(manual.steps), per_page):
         _page(pdf, manual)
@@ -188,6 +191,28 @@ def _parts(pdf: FPDF, manual: Manual) -> None:
         _text(pdf, 7, _SOFT)
         pdf.cell(0, 5.4, manual.names[index])
     pdf.set_xy(_MARGIN, top + (row + 1) * height)
+
+
+def _magnets(pdf: FPDF, manual: Manual) -> None:
+    """Where magnets go."""
+    columns, gap = 3, 5.0
+    width = (pdf.epw - (columns - 1) * gap) / columns
+    height = 0.75 * width + 9
+    _page(pdf, manual)
+    pdf.set_xy(_MARGIN, _MARGIN + 4)
+    _heading(pdf, "The magnets")
+    _lines(pdf, manual, [POLES])
+    top, row = pdf.get_y() + 2, 0
+    for index, picture in enumerate(manual.magnets):
+        row, column = (row + 1 if index % columns == 0 and index else row), index % columns
+        if column == 0 and top + (row + 1) * height > pdf.h - 14:
+            _page(pdf, manual)
+            top, row = _MARGIN + 2, 0
+        x, y = _MARGIN + column * (width + gap), top + row * height
+        _picture(pdf, picture.image, x, y, width, 0.75 * width)
+        pdf.set_xy(x, y + 0.75 * width)
+        _text(pdf, 11, _INK, "B")
+        pdf.cell(width, 5, f"part {picture.body + 1}")
 
 
 def _step(pdf: FPDF, step: ManualStep, place: int) -> None:

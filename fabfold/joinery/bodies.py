@@ -59,6 +59,8 @@ class PlacedPin:
         Height of that head, mm.
     thread_mm : float
         Length at its tip that cuts itself into the body that grips it, mm; 0 for a plain pin.
+    tight : bool
+        Whether the body that turns on it grips it too, so that the hinge rubs.
     """
 
     hinge: int
@@ -69,6 +71,7 @@ class PlacedPin:
     head_mm: float = 0.0
     head_height_mm: float = 0.0
     thread_mm: float = 0.0
+    tight: bool = False
 
     @property
     def length_mm(self) -> float:

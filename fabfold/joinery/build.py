@@ -17,6 +17,7 @@ from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.joinery.booleans import effective_tools, subtract, union
 from fabfold.joinery.carving import CarvedMaterial, carve
 from fabfold.joinery.cells import eroded_cells, model_manifold
+from fabfold.joinery.cut_walls import with_cut_walls
 from fabfold.joinery.cutting import BodyCutter
 from fabfold.joinery.hinge_placement import place_hinges
 from fabfold.joinery.links import link_body
@@ -53,6 +54,8 @@ def build_bodies(
     knuckles: int | None = None,
     face_gap_mm: float | None = None,
     pin: LoosePin | None = None,
+    wall_mm: float = 0.0,
+    chamfer_mm: float = 0.0,
     progress: Progress | None = None,
 ) -> Joinery:
     """Make the printed bodies of a kit.
@@ -86,6 +89,10 @@ def build_bodies(
     pin : hinges.hardware.LoosePin, optional
         Pin that is pushed in after printing, in place of printed cones. Its bores are open at both
         ends; :mod:`fabfold.joinery.loose_pins` clears one and closes the other.
+    wall_mm : float
+        Least thickness of the material behind the faces that the cut makes, mm.
+    chamfer_mm : float
+        Leg of the chamfer on the edges of the bodies' cells, mm; for bodies that are blocks.
     progress : Progress, optional
         Is told how far the work is.
 
@@ -115,6 +122,9 @@ def build_bodies(
     progress.update(0.0, "preparing the model and the hinges")
     _refuse_colliding_barrels(tree, motion, size, voxel_mm)
     model = model_manifold(voxels, voxel_mm)
+    walls_mm3 = 0.0
+    if wall_mm > 0.0:
+        model, walls_mm3 = with_cut_walls(model, tree, voxel_mm, size.gap_mm / 2, wall_mm)
     hinges = place_hinges(tree, motion, size, voxel_mm)
     past_barrels = _by_body(tree, barrel_sweeps(tree, motion, 1.05 * size.reach_mm / voxel_mm))
     past_plates = _by_body(
@@ -141,7 +151,7 @@ def build_bodies(
         solid = (
             link_body(cutter, tally)
             if index in hinges.plates
-            else _voxel_body(cutter, model, carved, tally)
+            else _voxel_body(cutter, model, carved, tally, chamfer_mm)
         )
         vertices, faces = printable_body(solid, body.name, origin)
         meshes.append(BodyMesh(body.name, vertices, faces))
@@ -159,11 +169,24 @@ def build_bodies(
         carved_mm3=round(tally.carved_mm3, 3),
         dropped_mm3=round(tally.dropped_mm3, 3),
         struts=tally.struts,
-        notes=(*carved.notes(), *tally.notes(voxel_mm, len(hinges.plates))),
+        notes=(
+            *_wall_notes(walls_mm3, wall_mm),
+            *carved.notes(),
+            *tally.notes(voxel_mm, len(hinges.plates)),
+        ),
         rounded_cells=carved.cells,
         rounded_skin_mm3=round(carved.skin_mm3, 3),
         rounded_inside_mm3=round(carved.inside_mm3, 3),
         face_gap_mm=None if face_gap_mm is None else float(face_gap_mm),
+    )
+
+
+def _wall_notes(added_mm3: float, wall_mm: float) -> tuple[str, ...]:
+    if added_mm3 < 0.5:
+        return ()
+    return (
+        f"{added_mm3:.0f} mm³ added where the cut left less than a wall of {wall_mm:g} mm behind "
+        "its face",
     )
 
 
@@ -217,11 +240,15 @@ def _refuse_colliding_barrels(
 
 
 def _voxel_body(
-    cutter: BodyCutter, model: manifold3d.Manifold, carved: CarvedMaterial, tally: BuildTally
+    cutter: BodyCutter,
+    model: manifold3d.Manifold,
+    carved: CarvedMaterial,
+    tally: BuildTally,
+    chamfer_mm: float,
 ) -> manifold3d.Manifold:
     """A body of voxels as one connected solid, mm, lattice origin at zero."""
     cells = cutter.tree.source[list(cutter.tree.bodies[cutter.index].voxels)]
-    space = _body_space(cutter, cells, model, tally)
+    space = _body_space(cutter, cells, model, tally, chamfer_mm)
     own = cutter.hinges.halves[cutter.index]
     cutouts = [placed.cutout for placed in own]
     carving_tools = carved.tools.get(cutter.index, [])
@@ -255,17 +282,21 @@ def _voxel_body(
 
 
 def _body_space(
-    cutter: BodyCutter, cells: NDArray[np.int32], model: manifold3d.Manifold, tally: BuildTally
+    cutter: BodyCutter,
+    cells: NDArray[np.int32],
+    model: manifold3d.Manifold,
+    tally: BuildTally,
+    chamfer_mm: float,
 ) -> manifold3d.Manifold:
     """Where the body may be: its cells, and of those that are shared in B its own octants."""
     inset = cutter.size.gap_mm / 2
-    whole = eroded_cells(cells, cutter.voxel_mm, inset)
+    whole = eroded_cells(cells, cutter.voxel_mm, inset, chamfer_mm=chamfer_mm)
     if cutter.tree.octants is None:
         return whole
     octants = cutter.tree.octants[list(cutter.tree.bodies[cutter.index].voxels)]
     if (octants == WHOLE).all():
         return whole
-    own = eroded_cells(cells, cutter.voxel_mm, inset, octants)
+    own = eroded_cells(cells, cutter.voxel_mm, inset, octants, chamfer_mm)
     tally.shared_cells += int((octants != WHOLE).sum())
     tally.shared_mm3 += (model ^ (whole - own)).volume()
     return own

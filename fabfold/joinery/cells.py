@@ -112,6 +112,7 @@ def eroded_cells(
     voxel_mm: float,
     inset_mm: float,
     octants: NDArray[np.uint8] | None = None,
+    chamfer_mm: float = 0.0,
 ) -> manifold3d.Manifold:
     """Cells of a body less everything within `inset_mm` of a cell that is not its own.
 
@@ -127,6 +128,8 @@ def eroded_cells(
         Half the gap between bodies in mm.
     octants : (m,) uint8 array, optional
         Which octants of each cell are the body's own, see ``FoldTree.octants``; all by default.
+    chamfer_mm : float
+        Leg of the chamfer on all outer edges in mm; none by default.
 
     Returns
     -------
@@ -134,20 +137,23 @@ def eroded_cells(
         In mm, lattice origin at zero.
     """
     if octants is None or (octants == WHOLE).all():
-        return _eroded_cubes(cells, voxel_mm, inset_mm)
+        return _eroded_cubes(cells, voxel_mm, inset_mm, chamfer_mm)
     kept = np.argwhere(unpacked(octants))
     halves = (2 * cells[kept[:, 0]] + kept[:, 1:]).astype(np.int32)
     # The half cell 0 begins where the cell 0 does, so its centre is a quarter of a cell below 0.
-    octant_solid = _eroded_cubes(halves, voxel_mm / 2, inset_mm)
+    octant_solid = _eroded_cubes(halves, voxel_mm / 2, inset_mm, chamfer_mm)
     return octant_solid.translate((-voxel_mm / 4,) * 3)
 
 
-def _eroded_cubes(cells: NDArray[np.int32], side_mm: float, inset_mm: float) -> manifold3d.Manifold:
+def _eroded_cubes(
+    cells: NDArray[np.int32], side_mm: float, inset_mm: float, chamfer_mm: float
+) -> manifold3d.Manifold:
     """Cubes of a lattice (m, 3) less everything near a cube that is not among them, mm.
 
     The result is the union of boxes: one for each cube, each pair that shares a face, each square
     of four and each block of eight, every one inset on all sides. Where cubes meet, these boxes
-    overlap and no gap is left.
+    overlap and no gap is left. Where one of them ends inside another, its chamfer is filled; what
+    is left is a chamfer on every outer edge, mitred in corners.
     """
     import manifold3d
 
@@ -163,8 +169,21 @@ def _eroded_cubes(cells: NDArray[np.int32], side_mm: float, inset_mm: float) -> 
                 continue
             size = np.array(extent) * side_mm - 2 * inset_mm
             corner = (np.array(cell) - 0.5) * side_mm + inset_mm
-            boxes.append(manifold3d.Manifold.cube(tuple(size)).translate(tuple(corner)))
+            boxes.append(_chamfered(size, chamfer_mm).translate(tuple(corner)))
     return manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add)
+
+
+def _chamfered(size: NDArray[np.float64], chamfer_mm: float) -> manifold3d.Manifold:
+    """A box from the origin to `size` (3,) with all edges chamfered, mm."""
+    import manifold3d
+
+    if chamfer_mm == 0.0:
+        return manifold3d.Manifold.cube(tuple(size))
+    corners = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
+    # On each of its three faces a corner stands back from the two others.
+    back = chamfer_mm * (1.0 - np.eye(3))
+    points = corners[:, None] * size + (1.0 - 2.0 * corners[:, None]) * back
+    return manifold3d.Manifold.hull_points(points.reshape(-1, 3))
 
 
 def _inside_larger(

@@ -364,13 +364,17 @@ def _triple(point: Floats) -> tuple[float, float, float]:
     return x, y, z
 
 
-def meshes_with_pins(joinery: Joinery) -> list[tuple[Floats, NDArray[np.int32]]]:
+def meshes_with_pins(
+    joinery: Joinery, *, tight: bool = True
+) -> list[tuple[Floats, NDArray[np.int32]]]:
     """The bodies with the pins that they grip, as they move.
 
     Parameters
     ----------
     joinery : Joinery
         The printed bodies and their pins.
+    tight : bool
+        Whether pins are there too that both of their bodies grip; they lie inside their barrels.
 
     Returns
     -------
@@ -379,6 +383,8 @@ def meshes_with_pins(joinery: Joinery) -> list[tuple[Floats, NDArray[np.int32]]]
     """
     meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     for pin in joinery.pins:
+        if pin.tight and not tight:
+            continue
         tip, tail = np.array(pin.tip_mm), np.array(pin.tail_mm)
         solid = cylinder_between(tip, tail, pin.diameter_mm / 2, outside=True)
         if pin.head_mm > 0:

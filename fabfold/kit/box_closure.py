@@ -52,10 +52,10 @@ def box_closure(recipe: Recipe, template: Template, planned: PlannedTree) -> Box
     Returns
     -------
     BoxClosure or None
-        None for a template that folds once more, whose visible faces are others in the end, and
-        where voxels share cells, for which the bound does not hold.
+        None for a template that folds once more, whose visible faces are others in the end, where
+        voxels share cells, for which the bound does not hold, and for blocks of full cells.
     """
-    if template.creases or recipe.share:
+    if template.creases or recipe.share or recipe.skin == "lattice":
         return None
     voxels = planned.voxels
     problem = from_features(

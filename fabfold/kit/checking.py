@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fabfold.joinery.lattice_skin import blocks_of
 from fabfold.joinery.loose_pins import meshes_with_pins
-from fabfold.joinery.magnets import Retention
+from fabfold.kit.retention_report import retention_checks
 from fabfold.kit.stages import BuiltTree
 from fabfold.printing.body_checks import check_bodies
 from fabfold.printing.checks import Check
@@ -91,7 +92,7 @@ def run_checks(built: BuiltTree, mode: PrintMode, progress: Progress) -> list[Ch
 
         checks += check_apart(joinery, built.apart)
     if built.retention is not None:
-        checks.append(_held(built, built.retention))
+        checks += retention_checks(built, built.retention)
     checks += _play(built, mode)
     progress.update(0.1, "printability")
     checks += check_bodies(joinery, tree, motion, profile, progress, pose)
@@ -139,31 +140,14 @@ def _lies(mode: PrintMode, pose: PrintPose) -> Check:
     )
 
 
-def _held(built: BuiltTree, retention: Retention) -> Check:
-    """How many hinges do not move when the box is shut."""
-    hinges = built.planned.tree.hinges
-    free = [hinges[index].name for index in retention.free_after]
-    note = f"{len(retention.pairs)} pairs of {retention.magnet} mm magnets; without them "
-    note += f"{len(retention.free_before)} hinges move"
-    if free:
-        note += f". Held by friction only: {', '.join(free)}"
-    return Check(
-        name="hinges held shut",
-        figure=float(len(hinges) - len(free)),
-        limit=None,
-        unit=f"of {len(hinges)} hinges",
-        ok=True,
-        note=note,
-    )
-
-
 def _play(built: BuiltTree, mode: PrintMode) -> list[Check]:
     """How far the outer faces of the box wander by the play of all hinges; for information."""
     planned = built.planned
+    voxels = blocks_of(planned.voxels) if mode.blocks else planned.voxels
     play = box_play(
         planned.tree,
         built.joinery,
-        planned.voxels.subvoxels,
+        voxels.subvoxels,
         planned.motion.angles_deg[-1],
         mode.loose_pin(),
     )
@@ -208,13 +192,11 @@ def _rounded(built: BuiltTree) -> Check:
 def _sampled(built: BuiltTree, profile: Profile) -> list[Check]:
     """The second opinion on the path, by another library."""
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery
+    meshes = meshes_with_pins(joinery, tight=False)
     seen = sample_path(
         tree.to_json(joinery.voxel_mm, joinery.origin_mm),
         motion.to_json(),
-        {
-            body.name: mesh
-            for body, mesh in zip(joinery.bodies, meshes_with_pins(joinery), strict=True)
-        },
+        {body.name: mesh for body, mesh in zip(joinery.bodies, meshes, strict=True)},
         step_deg=STEP_DEG,
         gap_step_deg=GAP_STEP_DEG,
     )

@@ -14,6 +14,7 @@ from fabfold.guide.fold_page import fold_page
 from fabfold.guide.manual import draw_manual, plan_steps
 from fabfold.guide.manual_html import manual_html
 from fabfold.guide.manual_pdf import manual_pdf
+from fabfold.guide.pauses import print_pauses
 from fabfold.kit.stages import BuiltTree
 from fabfold.printing.print_mode import PrintMode
 from fabfold.progress import Progress
@@ -63,8 +64,9 @@ def write_guide(
         cover=cover,
         colours=colours,
         contents=content_lines(joinery, tree, mode, built.retention),
-        advice=print_lines(mode, joinery),
+        advice=print_lines(mode, joinery, print_pauses(built.retention, built.apart)),
         assembly=assembly_lines(joinery, built.apart),
+        retention=built.retention,
         progress=progress,
     )
     paper = manual_pdf(manual, "a4")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from typing import Any
 
 from fabfold.lattice.template import Template
@@ -70,7 +71,8 @@ def join_key(recipe: Recipe, template: Template, mode: PrintMode, mark: list[Any
         fold_key(recipe, template, mark),
         recipe.voxel_mm,
         mode.profile.model_dump(mode="json"),
-        [mode.name, *([mode.pin] if mode.apart else []), mode.magnet],
+        [mode.name, *([mode.pin] if mode.apart else []), *astuple(mode.hold), mode.blocks],
+        "walls",
     )
 
 

@@ -325,14 +325,9 @@ class Kit(StageRunner):
 
     def print_mode(self) -> PrintMode:
         """How the kit is printed, with the clearance of the recipe where it gives one."""
-        from fabfold.printing.print_mode import print_mode
-        from fabfold.printing.profiles import load_profile
+        from fabfold.kit.holding import mode_of
 
-        recipe = self.recipe
-        return print_mode(
-            load_profile(recipe.profile), recipe.print, recipe.pin, recipe.clearance_mm,
-            recipe.magnet if recipe.retention == "magnet" else "", recipe.pose,
-        )  # fmt: skip
+        return mode_of(self.recipe)
 
     @property
     def kernel_seconds(self) -> float:

@@ -146,7 +146,7 @@ def save_built(store: StageStore, built: BuiltTree) -> list[str]:
 def load_built(store: StageStore, files: list[str]) -> BuiltTree:
     """Read what :func:`save_built` wrote."""
     from fabfold.apart.apart_kit import ApartKit
-    from fabfold.joinery.magnets import Retention
+    from fabfold.joinery.box_hold import Retention
 
     data = json.loads(store.path("made.json").read_text(encoding="utf-8"))
     planned = PlannedTree(

@@ -17,7 +17,7 @@ from fabfold.voxels.voxel_model import Voxels
 
 if TYPE_CHECKING:
     from fabfold.apart.apart_kit import ApartKit
-    from fabfold.joinery.magnets import Retention
+    from fabfold.joinery.box_hold import Retention
     from fabfold.printing.print_mode import PrintMode
 
 __all__ = ["BuiltTree", "PlannedTree", "build", "build_first"]
@@ -47,7 +47,7 @@ class BuiltTree:
     apart : ApartKit or None
         Order of assembly and plates of a kit that is printed body by body.
     retention : Retention or None
-        What holds the box shut, where that was asked for.
+        What holds the kit shut, where that was asked for.
     """
 
     planned: PlannedTree
@@ -87,30 +87,32 @@ def build(
         If its bodies come too near to each other on the path, or fit no plate.
     """
     from fabfold.joinery.build import build_bodies
+    from fabfold.joinery.lattice_skin import CHAMFER_SHARE, blocks_of
     from fabfold.joinery.loose_pins import meshes_with_pins
+    from fabfold.kit.holding import hold_kit
     from fabfold.proof.certify import certify, certify_orders
 
-    profile, apart, retention = mode.profile, None, None
+    profile, apart = mode.profile, None
     joinery = build_bodies(
-        planned.voxels,
+        blocks_of(planned.voxels) if mode.blocks else planned.voxels,
         planned.tree,
         planned.motion,
         voxel_mm=voxel_mm,
         clearance_mm=profile.clearance_mm,
         face_gap_mm=mode.face_gap_mm,
         pin=mode.loose_pin(),
+        wall_mm=profile.min_wall_mm,
+        chamfer_mm=CHAMFER_SHARE * voxel_mm if mode.blocks else 0.0,
         progress=progress,
     )
     if mode.apart:
         from fabfold.apart.apart_kit import prepare_apart
 
         joinery, apart = prepare_apart(planned.tree, planned.motion, joinery, mode, progress)
-    if mode.magnet:
-        from fabfold.joinery.magnets import MAGNETS, hold_shut
-
-        progress.update(None, "places for magnets")
-        joinery, retention = hold_shut(planned.tree, planned.motion, joinery, MAGNETS[mode.magnet])
-    tree, motion, meshes = planned.tree, planned.motion, meshes_with_pins(joinery)
+    tree, motion = planned.tree, planned.motion
+    joinery, apart, retention = hold_kit(tree, motion, joinery, apart, mode, progress)
+    # A pin that both bodies grip touches them on purpose, and lies inside its barrel.
+    meshes = meshes_with_pins(joinery, tight=False)
     certificate = certify(
         tree,
         motion,
@@ -130,6 +132,12 @@ def build(
         progress=progress,
         volume=np.array([body.volume for body in joinery.bodies]),
     )
+    tight = [tree.hinges[pin.hinge].name for pin in joinery.pins if pin.tight]
+    if tight:
+        certificate["geometry"] += (
+            f"; the pins of {', '.join(tight)}, which both of their bodies grip, are left out: "
+            "they lie inside their barrels"
+        )
     motion = replace(motion, certificate=certificate)
     return BuiltTree(replace(planned, motion=motion), joinery, refused, apart, retention)
 

@@ -16,7 +16,7 @@ from fabfold.export.colours import body_colours
 from fabfold.export.hardware_brep import hardware_solids
 from fabfold.export.step import write_step
 from fabfold.joinery.bodies import Joinery
-from fabfold.joinery.magnets import Retention
+from fabfold.joinery.box_hold import Retention
 from fabfold.kit.stages import BuiltTree
 from fabfold.tree.fold_tree import FoldTree
 

@@ -21,10 +21,10 @@ from fabfold.export.stl import write_stl
 from fabfold.export.threemf import posed, write_3mf
 from fabfold.export.urdf import write_urdf
 from fabfold.files import write_bytes, write_json, write_text
-from fabfold.joinery.magnets import Retention
 from fabfold.kit.box_closure import BoxClosure
 from fabfold.kit.figure_pictures import figure_pictures
 from fabfold.kit.guide_files import PICTURE, write_guide
+from fabfold.kit.retention_report import retention_data, retention_summary
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.kit.step_process import assembled_path
 from fabfold.lattice.template import Template
@@ -156,47 +156,10 @@ def kit_summary(
         "print": "in-place" if built.apart is None else "apart",
         **({"profile": profile} if profile else {}),
         **_printed_apart(built),
-        **(
-            {}
-            if built.retention is None
-            else {
-                "magnet_pairs": len(built.retention.pairs),
-                "hinges_free_when_shut": [
-                    tree.hinges[index].name for index in built.retention.free_after
-                ],
-            }
-        ),
+        **({} if built.retention is None else retention_summary(built, built.retention)),
         "notes": list(joinery.notes),
         "refused_trees": list(built.refused),
         **({"wishes": list(wishes)} if wishes else {}),
-    }
-
-
-def _retention_data(built: BuiltTree, retention: Retention) -> dict[str, Any]:
-    """What ``retention.json`` holds."""
-    names = [body.name for body in built.joinery.bodies]
-    hinges = built.planned.tree.hinges
-    return {
-        "format": "fabfold-retention",
-        "version": 1,
-        "magnet_mm": [float(part) for part in retention.magnet.split("x")],
-        "pairs": [
-            {
-                "north_out": {
-                    "body": names[pair.bodies[0]],
-                    "mouth_mm": list(pair.points_mm[0]),
-                    "inwards": list(pair.inwards[0]),
-                },
-                "south_out": {
-                    "body": names[pair.bodies[1]],
-                    "mouth_mm": list(pair.points_mm[1]),
-                    "inwards": list(pair.inwards[1]),
-                },
-            }
-            for pair in retention.pairs
-        ],
-        "moves_without": [hinges[index].name for index in retention.free_before],
-        "held_by_friction_only": [hinges[index].name for index in retention.free_after],
     }
 
 
@@ -288,8 +251,7 @@ def write_printable(
         ),
     }
     write_built(folder, built)
-    magnets = 0 if built.retention is None else 2 * len(built.retention.pairs)
-    write_bill(folder, joinery, mode.profile.material, mode.pin, (magnets, mode.magnet))
+    write_bill(folder, joinery, mode.profile.material, mode.pin, built.retention)
     beside: dict[str, bytes] = dict(guide or {})
     if guide:
         beside["Bill of Materials/bom.csv"] = (folder / "bom.csv").read_bytes()
@@ -325,7 +287,7 @@ def write_printable(
             auxiliaries=beside,
         )
     if built.retention is not None:
-        write_json(folder / "retention.json", _retention_data(built, built.retention))
+        write_json(folder / "retention.json", retention_data(built, built.retention))
     else:
         (folder / "retention.json").unlink(missing_ok=True)
     write_urdf(folder / f"{name}.urdf", joinery, tree, built.planned.motion, name)

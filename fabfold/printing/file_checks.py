@@ -13,12 +13,12 @@ from fabfold.errors import GeometryError, ModelError
 from fabfold.joinery.bodies import BodyMesh
 from fabfold.joinery.cells import solids_of
 from fabfold.joinery.soundness import piece_of_vertices
-from fabfold.meshes import compact, face_normals, mesh_volume, weld
+from fabfold.meshes import centre_of_mass, compact, face_normals, mesh_volume, weld
 from fabfold.printing.checks import Check
 from fabfold.printing.escape_checks import check_escape
 from fabfold.printing.gap_checks import check_gaps
 from fabfold.printing.profiles import Profile
-from fabfold.printing.standing import centre_of_mass, stands_over
+from fabfold.printing.standing import stands_over
 from fabfold.printing.thickness import ray_thickness, surface_area
 from fabfold.printing.topology_checks import check_topology
 from fabfold.printing.wall_checks import thin_share

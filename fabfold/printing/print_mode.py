@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from fabfold.errors import RecipeError
 from fabfold.joinery.pin_kinds import PINS, PinFit
@@ -12,7 +12,63 @@ from fabfold.printing.profiles import Profile
 if TYPE_CHECKING:
     from hinges.hardware import LoosePin
 
-__all__ = ["PrintMode", "print_mode"]
+__all__ = ["Hold", "PrintMode", "print_mode"]
+
+
+#: Processes that can pause for a magnet: no powder or resin stands where it goes.
+_PAUSING: Final = ("FDM", "PolyJet")
+
+
+@dataclass(frozen=True)
+class Hold:
+    """What is to hold a kit shut.
+
+    Attributes
+    ----------
+    magnet : str
+        Name of the magnets, of :data:`fabfold.joinery.magnets.MAGNETS`; empty for none.
+    friction : bool
+        Whether hinges that nothing else holds get pins that both bodies grip.
+    in_a : bool
+        Whether magnets hold the model too, before it is folded.
+    enclosed : bool
+        Whether magnets are laid in while the print pauses, and closed in.
+    """
+
+    magnet: str = ""
+    friction: bool = False
+    in_a: bool = False
+    enclosed: bool = False
+
+    def check(self, profile: Profile, *, apart: bool) -> None:
+        """Refuse what a way of printing cannot hold.
+
+        Parameters
+        ----------
+        profile : Profile
+            Printer and material.
+        apart : bool
+            Whether the bodies are printed one by one.
+
+        Raises
+        ------
+        RecipeError
+            With what to do instead.
+        """
+        if self.friction and not apart:
+            raise RecipeError(
+                "--retention friction: it takes pins that both bodies grip, and a kit that is "
+                "printed in place has printed cones, which have to stay free of each other; take "
+                "--retention magnet, or --print apart"
+            )
+        if not self.magnet and (self.in_a or self.enclosed):
+            option = "--retention-in-a" if self.in_a else "--magnet-fit enclosed"
+            raise RecipeError(f"{option} is about magnets: add --retention magnet")
+        if self.enclosed and profile.process not in _PAUSING:
+            raise RecipeError(
+                f"--magnet-fit enclosed: a {profile.process} print cannot pause with an empty "
+                "pocket; take --magnet-fit glued, or a filament profile such as fdm-pla-0.4"
+            )
 
 
 @dataclass(frozen=True)
@@ -29,9 +85,10 @@ class PrintMode:
         Printer and material, with the clearance and the smallest gap of this way.
     pin : str
         Name of the loose pin, of :data:`fabfold.joinery.pin_kinds.PINS`.
-    magnet : str
-        Name of the magnets that hold the box shut, of :data:`fabfold.joinery.magnets.MAGNETS`;
-        empty where nothing does.
+    hold : Hold
+        What holds the kit shut.
+    blocks : bool
+        Whether bodies are blocks of cells, without the model's surface.
     pose : str
         Pose in which it is printed in place, as of :func:`fabfold.printing.print_pose.print_pose`.
     """
@@ -40,7 +97,8 @@ class PrintMode:
     why: str
     profile: Profile
     pin: str
-    magnet: str = ""
+    hold: Hold = Hold()
+    blocks: bool = False
     pose: str = "a"
 
     @property
@@ -103,7 +161,9 @@ def print_mode(
     asked: str = "auto",
     pin: str = "1.75",
     clearance_mm: float | None = None,
-    magnet: str = "",
+    hold: Hold | None = None,
+    *,
+    blocks: bool = False,
     pose: str = "a",
 ) -> PrintMode:
     """Choose how a kit is printed.
@@ -118,8 +178,10 @@ def print_mode(
         Name of the loose pin, of :data:`fabfold.joinery.pin_kinds.PINS`.
     clearance_mm : float, optional
         Clearance in the hinges, mm, in place of the profile's.
-    magnet : str
-        Name of the magnets that hold the box shut; empty for none.
+    hold : Hold, optional
+        What is to hold the kit shut; nothing by default.
+    blocks : bool
+        Whether bodies are blocks of cells, without the model's surface.
     pose : str
         Pose in which it is printed in place.
 
@@ -131,7 +193,8 @@ def print_mode(
     Raises
     ------
     RecipeError
-        If a clearance is not above the smallest gap that the profile asks for.
+        If a clearance is not above the smallest gap that the profile asks for, or this way of
+        printing cannot hold the kit as asked.
     """
     apart = asked == "apart" or (asked == "auto" and not profile.in_place)
     if asked != "auto":
@@ -148,4 +211,16 @@ def print_mode(
             f"at least; give more than that (its own clearance is {gaps.clearance_mm:g} mm)"
         )
     gapped = profile.model_copy(update={"clearance_mm": clearance, "min_gap_mm": gaps.min_gap_mm})
-    return PrintMode(apart, why, gapped, pin, magnet, pose)
+    hold = hold or Hold()
+    hold.check(profile, apart=apart)
+    if hold.friction and PINS[pin].screw:
+        raise RecipeError(
+            f"--retention friction: a screw rubs as hard as it is driven in, so --pin {pin} needs "
+            "no friction pins; take --retention magnet, or a plain pin such as --pin 1.75"
+        )
+    if hold.enclosed and not apart and pose != "a":
+        raise RecipeError(
+            f"--pose {pose}: magnets are enclosed at heights that are known for the model's pose; "
+            "leave --pose out, or take --magnet-fit glued"
+        )
+    return PrintMode(apart, why, gapped, pin, hold, blocks, pose)

@@ -5,26 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["centre_of_mass", "stands_over"]
+__all__ = ["stands_over"]
 
 Floats = NDArray[np.float64]
-
-
-def centre_of_mass(corners: Floats) -> Floats:
-    """Centre of mass of closed meshes of one density.
-
-    Parameters
-    ----------
-    corners : (f, 3, 3) float64 array
-        Corners of all triangles, counter-clockwise seen from outside, in any unit.
-
-    Returns
-    -------
-    (3,) float64 array
-        In that unit.
-    """
-    volumes = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
-    return np.asarray((volumes[:, None] * corners.sum(axis=1) / 4).sum(axis=0) / volumes.sum())
 
 
 def stands_over(centre: Floats, under: Floats) -> bool:

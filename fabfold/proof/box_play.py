@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.body_poses import poses_in_mm
 from fabfold.joinery.box_faces import FaceMeeting, across, face_meetings
+from fabfold.joinery.linkage import NUMBERS, Linkage
 from fabfold.joinery.sizes import MIN_WALL_MM
 from fabfold.lattice.rotations import FACES
 from fabfold.tree.fold_tree import FoldTree
@@ -39,8 +40,6 @@ _PLACES, _PATCH = (-0.33, 0.0, 0.33), 0.16
 _DEEP = 0.3
 #: Share of the draws within which a figure lies.
 _SHARE = 95.0
-#: Numbers of one hinge: shift across (2) and along the axis, turns across (2) and about it.
-_SIX = 6
 
 
 @dataclass(frozen=True)
@@ -66,34 +65,6 @@ class BoxPlay:
     held_wander_mm: float
     held_seam_mm: float
     press_mm: float
-
-
-class _PlayLinkage:
-    """Motions of points of the box, linear in the six numbers of every hinge."""
-
-    def __init__(self, tree: FoldTree, joinery: Joinery, poses: F64) -> None:
-        origin = np.asarray(joinery.origin_mm)
-        self.size = _SIX * len(tree.hinges)
-        self._way: dict[int, tuple[int, ...]] = {0: ()}
-        self._frames: list[tuple[F64, F64]] = []
-        for index, hinge in enumerate(tree.hinges):
-            pose = poses[hinge.parent]
-            point = origin + joinery.voxel_mm * np.asarray(hinge.point, dtype=float)
-            axis = pose[:3, :3] @ np.asarray(hinge.direction, dtype=float)
-            u, v = across(axis)
-            frame = np.array([u, v, axis])
-            self._frames.append((pose[:3, :3] @ point + pose[:3, 3], frame))
-            self._way[hinge.child] = (*self._way[hinge.parent], index)
-
-    def of(self, body: int, point: F64) -> F64:
-        """Rows (3, 6 h): motion of a point of a body, mm, by the numbers of the hinges."""
-        rows = np.zeros((3, self.size))
-        for index in self._way[body]:
-            place, frame = self._frames[index]
-            columns = slice(_SIX * index, _SIX * index + 3)
-            rows[:, columns] = frame.T
-            rows[:, columns.stop : columns.stop + 3] = np.cross(frame, point - place).T
-        return rows
 
 
 def box_play(
@@ -133,11 +104,11 @@ def box_play(
     if not tree.hinges:
         return BoxPlay(0.0, joinery.gap_mm, 0.0, joinery.gap_mm, 0.0)
     poses = poses_in_mm(tree, joinery, angles_deg)
-    linkage = _PlayLinkage(tree, joinery, poses)
+    linkage = Linkage(tree, joinery, poses)
     meetings = face_meetings(tree, joinery, poses)
     limits = _limits(tree, joinery, angles_deg, pin)
     rng = np.random.default_rng(seed)
-    draws = _within(rng.uniform(-1.0, 1.0, (_DRAWS, linkage.size)) * limits, limits)
+    draws = _within(rng.uniform(-1.0, 1.0, (_DRAWS, NUMBERS * linkage.hinges)) * limits, limits)
     parting, gaps = _parting(meetings, material, linkage, joinery, poses)
     outside = _outside(tree, joinery, poses, linkage)
     figures: list[float] = []
@@ -194,14 +165,14 @@ def _limits(tree: FoldTree, joinery: Joinery, angles_deg: F64, pin: LoosePin | N
 
 def _within(draws: F64, limits: F64) -> F64:
     """Draws (d, 6 h) scaled down so that shift and tilt of a hinge share its clearance."""
-    shaped = draws.reshape(len(draws), -1, _SIX).copy()
-    used = np.abs(shaped / limits.reshape(-1, _SIX))
+    shaped = draws.reshape(len(draws), -1, NUMBERS).copy()
+    used = np.abs(shaped / limits.reshape(-1, NUMBERS))
     across_ = np.hypot(used[..., 0], used[..., 1]) + np.hypot(used[..., 3], used[..., 4])
     shrink = np.maximum(across_, 1.0)[..., None]
     shaped[..., :2] /= shrink
     shaped[..., 3:5] /= shrink
     for column in (2, 5):
-        most = limits.reshape(-1, _SIX)[:, column]
+        most = limits.reshape(-1, NUMBERS)[:, column]
         shaped[..., column] = np.clip(shaped[..., column], -most, most)
     return np.asarray(shaped.reshape(draws.shape))
 
@@ -209,13 +180,13 @@ def _within(draws: F64, limits: F64) -> F64:
 def _parting(
     meetings: list[FaceMeeting],
     material: NDArray[np.bool_],
-    linkage: _PlayLinkage,
+    linkage: Linkage,
     joinery: Joinery,
     poses: F64,
 ) -> tuple[F64, F64]:
     """Rows (m, 6 h): how far bodies part where their cells meet, and the gaps there (m,), mm."""
     side = joinery.voxel_mm
-    rows, gaps = [np.zeros(linkage.size)], [0.0]
+    rows, gaps = [np.zeros(NUMBERS * linkage.hinges)], [0.0]
     for meeting in meetings:
         u, v = across(meeting.normal)
         one, other = meeting.bodies
@@ -230,7 +201,7 @@ def _parting(
                 if depth > _DEEP:
                     continue
                 point = meeting.middle + side * offset
-                motion = linkage.of(other, point) - linkage.of(one, point)
+                motion = linkage.motion(other, point) - linkage.motion(one, point)
                 rows.append(meeting.normal @ motion)
                 gaps.append(joinery.gap_mm + side * depth)
     return np.array(rows), np.array(gaps)
@@ -285,7 +256,7 @@ def _let_go(draws: F64, parting: F64, least: F64, most: F64, limits: F64) -> F64
 
 
 def _outside(
-    tree: FoldTree, joinery: Joinery, poses: F64, linkage: _PlayLinkage
+    tree: FoldTree, joinery: Joinery, poses: F64, linkage: Linkage
 ) -> tuple[tuple[F64, F64], F64, list[tuple[int, int, F64]]]:
     """Corners of the outer faces of the box, in the frame of the root body.
 
@@ -312,7 +283,7 @@ def _outside(
                 key = tuple(np.round(point / side, 3).tolist())
                 at[voxel, face, key] = len(points)
                 points.append(point)
-                motions.append(linkage.of(body, point))
+                motions.append(linkage.motion(body, point))
                 normals.append(normal)
     seams = []
     for (voxel, face, key), one in at.items():

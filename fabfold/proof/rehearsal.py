@@ -3,7 +3,7 @@
 The replay (:mod:`fabfold.proof.replay`) folds without weight, to see whether anything is in the
 way. Here the bodies weigh what they weigh, in a chosen pose: motors fold the kit, and tell what
 torque each hinge takes. Then the box is let go, with gravity from each of six sides and only its
-magnets to hold it, to see whether it stays shut.
+magnets and friction pins to hold it, to see whether it stays shut.
 """
 
 from __future__ import annotations
@@ -17,16 +17,17 @@ from numpy.typing import NDArray
 
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
-from fabfold.joinery.magnets import MAGNETS, Retention
+from fabfold.joinery.box_hold import Retention
+from fabfold.joinery.magnets import MAGNETS
 from fabfold.physics.rig import Box, Motor, hinge_joints, rig_model
-from fabfold.progress import Progress, SilentProgress
+from fabfold.progress import Progress, ProgressPart, SilentProgress
 from fabfold.proof.replay import course, material_boxes, require_finite
 from fabfold.tree.fold_tree import FoldTree
 
 if TYPE_CHECKING:
     import mujoco
 
-__all__ = ["SIDES", "Rehearsal", "rehearse"]
+__all__ = ["SIDES", "Rehearsal", "let_go", "rehearse"]
 
 F64 = NDArray[np.float64]
 
@@ -122,7 +123,7 @@ def rehearse(
     friction : float
         Coefficient between bodies that touch.
     retention : Retention, optional
-        Magnets that hold the box.
+        Magnets and friction pins that hold the box.
     progress : Progress, optional
         Hears of moves and sides.
 
@@ -137,25 +138,49 @@ def rehearse(
         If the simulation diverges.
     """
     progress = progress or SilentProgress()
-    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
-    gap = float(motion.certificate.get("min_gap_mm", joinery.clearance_mm))
-    boxes = material_boxes(tree, meshes, joinery.voxel_mm, joinery.origin_mm, gap)
-    room = sum(float((box.high - box.low).prod()) for box in boxes)
-    weight_g = sum(body.volume for body in joinery.bodies) * density_g_cm3 / 1000.0
-    scene = _Scene(tree, boxes, weight_g / 1000.0 / room, joinery.voxel_mm, friction)
+    scene, weight_g = _scene(tree, motion, joinery, density_g_cm3, friction)
     turned, held = scene.fold(motion, up, progress)
-    opens = {}
-    for number, side in enumerate(SIDES):
-        progress.update(0.7 + 0.05 * number, f"letting the box go, {side} up")
-        opens[side] = round(scene.let_go(motion.angles_deg[-1], side, joinery, retention), 1)
+    later = ProgressPart(progress, 0.7, 1.0)
     return Rehearsal(
         up,
         friction,
         round(weight_g, 1),
         tuple(np.round(turned, 1).tolist()),
         tuple(np.round(held, 1).tolist()),
-        opens,
+        scene.on_all_sides(motion, joinery, retention, later),
     )
+
+
+def let_go(
+    tree: FoldTree,
+    motion: Motion,
+    joinery: Joinery,
+    density_g_cm3: float,
+    *,
+    friction: float = 0.3,
+    retention: Retention | None = None,
+) -> dict[str, float]:
+    """Let the box go without folding it first; parameters as of :func:`rehearse`.
+
+    Returns
+    -------
+    dict of str to float
+        How far its widest hinge opens, degrees, by the side that is up.
+    """
+    scene, _ = _scene(tree, motion, joinery, density_g_cm3, friction)
+    return scene.on_all_sides(motion, joinery, retention, SilentProgress())
+
+
+def _scene(
+    tree: FoldTree, motion: Motion, joinery: Joinery, density_g_cm3: float, friction: float
+) -> tuple[_Scene, float]:
+    """A kit that weighs something, and how much, g."""
+    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
+    gap = float(motion.certificate.get("min_gap_mm", joinery.clearance_mm))
+    boxes = material_boxes(tree, meshes, joinery.voxel_mm, joinery.origin_mm, gap)
+    room = sum(float((box.high - box.low).prod()) for box in boxes)
+    weight_g = sum(body.volume for body in joinery.bodies) * density_g_cm3 / 1000.0
+    return _Scene(tree, boxes, weight_g / 1000.0 / room, joinery.voxel_mm, friction), weight_g
 
 
 class _Scene:
@@ -200,10 +225,20 @@ class _Scene:
             held[~turning] = np.maximum(held, torque)[~turning]
         return turned, held
 
-    def let_go(
+    def on_all_sides(
+        self, motion: Motion, joinery: Joinery, retention: Retention | None, progress: Progress
+    ) -> dict[str, float]:
+        """How far the widest hinge opens with each side up, degrees."""
+        opens = {}
+        for number, side in enumerate(SIDES):
+            progress.update(number / len(SIDES), f"letting the box go, {side} up")
+            opens[side] = round(self._opens(motion.angles_deg[-1], side, joinery, retention), 1)
+        return opens
+
+    def _opens(
         self, angles_deg: F64, up: str, joinery: Joinery, retention: Retention | None
     ) -> float:
-        """How far the widest hinge opens when only magnets hold the box, degrees."""
+        """How far the widest hinge opens when only its retention holds the box, degrees."""
         import mujoco
 
         tree = self._tree
@@ -213,10 +248,16 @@ class _Scene:
             gravity=self._gravity(up), friction=self._friction,
         )  # fmt: skip
         data = mujoco.MjData(model)
-        joint, _ = hinge_joints(model, tree)
+        joint, dof = hinge_joints(model, tree)
         data.qpos[joint] = np.radians(angles_deg)
+        if retention is not None and retention.friction is not None:
+            rubs, nmm = retention.friction, 1000.0 / self._side**2  # in kg · side² / s²
+            rubbing = dof[list(rubs.hinges)]
+            model.dof_frictionloss[rubbing] = rubs.torque_nmm * nmm
+            # Dry friction creeps in MuJoCo unless it is made stiff.
+            model.dof_solref[rubbing, 0], model.dof_solimp[rubbing, :2] = 0.004, 0.9999
         mujoco.mj_forward(model, data)
-        pulls = [] if retention is None else self._pulls(model, joinery, retention)
+        pulls = self._pulls(model, joinery, retention) if retention and retention.magnet else []
         for _ in range(round(_LET_GO_S / 0.002)):
             data.qfrc_applied[:] = 0.0
             for pull in pulls:
@@ -229,11 +270,14 @@ class _Scene:
         magnet = MAGNETS[retention.magnet]
         origin = np.asarray(joinery.origin_mm)
         found = []
+        deep = retention.skin_mm + magnet.thick_mm / 2
         for pair in retention.pairs:
+            if pair.shape != "B":
+                continue
             bodies = [model.body(self._tree.bodies[body].name).id for body in pair.bodies]
             # Seen from the middles of the magnets, which never meet, the pull has a direction.
             places = [
-                (np.array(point) + magnet.thick_mm / 2 * np.array(inward) - origin) / self._side
+                (np.array(point) + deep * np.array(inward) - origin) / self._side
                 for point, inward in zip(pair.points_mm, pair.inwards, strict=True)
             ]
             force = magnet.pull_n * 1000.0 / self._side

@@ -28,6 +28,8 @@ Vector = tuple[float, float, float]
 
 #: Words for numbers.
 _PREFER = {"hinges": 0.0, "balanced": 0.5, "surface": 1.0}
+#: Fields that are true or false.
+_SWITCHES = ("joints_inside", "share", "retention_in_a")
 _VOID = {"inside": 1.0, "even": 0.0, "surface": -1.0}
 
 
@@ -64,11 +66,23 @@ class Recipe(BaseModel):
         Field(description="loose pin of bodies printed apart: filament 1.75 or 2.85, rod-2, m2"),
     ] = "1.75"
     retention: Annotated[
-        Literal["none", "magnet"], Field(description="what holds the box shut: none, or magnet")
+        Literal["none", "magnet", "friction", "magnet+friction"],
+        Field(description="what holds the box shut: none, magnet, friction or magnet+friction"),
     ] = "none"
+    retention_in_a: Annotated[
+        bool, Field(description="magnets hold the model too, before it is folded")
+    ] = False
     magnet: Annotated[
         Literal["3x1", "4x2", "5x2"], Field(description="disc magnets, diameter x thickness in mm")
     ] = "3x1"
+    magnet_fit: Annotated[
+        Literal["glued", "enclosed"],
+        Field(description="magnets: glued in, or enclosed while the print pauses"),
+    ] = "glued"
+    skin: Annotated[
+        Literal["model", "lattice"],
+        Field(description="the model's surface, or lattice: blocks of cells with chamfered edges"),
+    ] = "model"
     pose: Annotated[
         str,
         Field(
@@ -158,7 +172,7 @@ class Recipe(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _no_truth_for_a_number(cls, value: Any, info: ValidationInfo) -> Any:
-        if isinstance(value, bool) and info.field_name not in ("joints_inside", "share"):
+        if isinstance(value, bool) and info.field_name not in _SWITCHES:
             raise ValueError("must be a number or a text, not true or false")
         return value
 

@@ -82,7 +82,7 @@ def hinge_outlook(
     FabfoldError
         If no hinge fits, saying which voxel would do.
     """
-    mode = print_mode(load_profile(profile), "auto", pin, clearance_mm, "")
+    mode = print_mode(load_profile(profile), "auto", pin, clearance_mm)
     clearance, loose = mode.profile.clearance_mm, mode.loose_pin()
     size = hinge_size(voxel_mm, clearance, gap_mm=mode.face_gap_mm, pin=loose)
     play = single_hinge_play(
