@@ -25,6 +25,7 @@ from hinges import (
     Detents,
     DoubleHinge,
     FilamentPin,
+    FoldedSheet,
     Leaf,
     LiftPin,
     Magnet,
@@ -334,6 +335,25 @@ def stop_pictures() -> None:
     page("stops.png", rows)
 
 
+def folded_pictures() -> None:
+    """A tray, flat, on its way and folded; and its snaps."""
+    sheet = FoldedSheet.tray(60, 50, 25, use="few")
+    view = replace(UPRIGHT, azimuth_deg=-60.0, elevation_deg=45.0)
+    rows = [("FoldedSheet.tray(60, 50, 25).flat", picture([sheet.flat], view, y_up=False))]
+    for share in (0.5, 1.0):
+        panels, webs = sheet.bent(share)
+        colors = [BLUE if index == sheet.base else ORANGE for index in range(len(panels))]
+        painted = (*colors, *[GREY] * len(webs))
+        drawn = picture([*panels, *webs], view, painted, y_up=False)
+        rows.append((f"bent({share:g})", drawn))
+    fold = FoldedSheet(Pos(0, 0, 1) * Box(36, 24, 2), [((0, -12), (0, 12))], use="few")
+    near = replace(UPRIGHT, azimuth_deg=-125.0, elevation_deg=32.0)
+    for share, words in ((0.0, "lock and sockets"), (0.8, "before they meet"), (1.0, "held")):
+        panels, webs = fold.bent(share)
+        rows.append((words, picture([*panels, *webs], near, y_up=False)))
+    page("folded.png", rows)
+
+
 def _end(shape: Any, level: float) -> Any:
     """Keep what lies below a level of z."""
     return shape - Pos(0, 0, level + 50) * Box(200, 200, 100)
@@ -444,6 +464,7 @@ def main() -> None:
     pin_pictures()
     stop_pictures()
     double_pictures()
+    folded_pictures()
     other_pictures()
     example_pictures()
 

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from .exceptions import FitError as FitError
     from .exceptions import HingeError as HingeError
     from .exceptions import KernelError as KernelError
+    from .fold_snap import FoldSnap as FoldSnap
+    from .folded_sheet import FoldedSheet as FoldedSheet
     from .hardware import FilamentPin as FilamentPin
     from .hardware import RodPin as RodPin
     from .hardware import Screw as Screw
@@ -70,6 +72,8 @@ _HOMES = {
     "DoubleHingePart": "double",
     "FilamentPin": "hardware",
     "FitError": "exceptions",
+    "FoldSnap": "fold_snap",
+    "FoldedSheet": "folded_sheet",
     "HingeCarve": "single",
     "HingeError": "exceptions",
     "HingeHalf": "single",

@@ -7,9 +7,11 @@ looks at the other body. It ends above at the body's top, which lies below the a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import cos, inf, radians, sin, sqrt, tan
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from .clearance import number
 from .exceptions import HingeError
@@ -35,11 +37,14 @@ _OVERLAP = 0.2
 _INSET = 0.05
 #: Detail that an outline does not keep, in mm.
 _FINE = 1e-5
-#: Step of the arcs of roundings, in degrees.
-_STEP = 7.5
+#: How far from the corner the curve of a rounding is held, as a share of its reach.
+_SMOOTH = 0.8
+#: Points of the curve of a rounding, and the powers of its polynomials.
+_POINTS = 17
+_POWERS = np.arange(5)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Arm:
     """Arms from the knuckles down to the wall of the body, for an axis outside of the body.
 
@@ -67,7 +72,8 @@ class Arm:
     clip : float, optional
         Distance in mm below the axis at which the arm ends, for a body that is thinner than it.
     round_top, round_bottom : float
-        Radius in mm of the rounding between arm and wall, above and below.
+        How far in mm the roundings between arm and wall reach along both, above and below. Their
+        curvature is continuous.
     root : float
         How deep in mm the arms reach into the wall, where a bar joins them along the axis.
     """
@@ -108,6 +114,12 @@ class Arm:
                 "arm: round_top lies where fill and clear_top work: give fill=False, and no "
                 "clear_top"
             )
+
+    def __repr__(self) -> str:
+        """The call that makes this arm, without what is left at its default."""
+        asked = ((each.name, getattr(self, each.name), each.default) for each in fields(self))
+        more = (f"{name}={value!r}" for name, value, default in asked if value != default)
+        return f"Arm({', '.join(more)})"
 
     @classmethod
     def pair(cls, step: float, **options: Any) -> tuple[Arm, Arm]:
@@ -156,7 +168,7 @@ class Arm:
         if self.height is not None:
             return self.height
         lean = radians(self.angle)
-        over = _SLIM * layout.radius / sin(lean) + self.round_top / tan(0.5 * lean)
+        over = _SLIM * layout.radius / sin(lean) + self.round_top
         # Folded, the other body's edge lies one gap beyond the top and looks at the arm's slope.
         over += gap / sin(lean) - gap
         above = -0.5 * gap if self.clear_top is not False else over
@@ -186,10 +198,10 @@ class Arm:
         low, high : float
             Its lower and upper end, as y in the hinge's frame, mm.
         """
-        lean, top = radians(self.angle), self.top(gap)
+        top = self.top(gap)
         low, high = self._ends(layout, gap)
-        low -= self.round_bottom * tan(0.5 * lean)
-        high += self.round_top / tan(0.5 * lean)
+        low -= self.round_bottom
+        high += self.round_top
         if self.fill:
             high = max(high, min(0.0, top))
         if self.clear_top is not False:
@@ -253,17 +265,14 @@ class Arm:
                 "use a deeper clip or a smaller height",
             )
         sloped = offset / sin(lean) - layout.radius * tan(0.5 * lean)
-        for name, radius, length in (
-            ("round_top", self.round_top, self.round_top / tan(0.5 * lean)),
-            ("round_bottom", self.round_bottom, self.round_bottom * tan(0.5 * lean)),
-        ):
-            if radius:
+        for name, reach in (("round_top", self.round_top), ("round_bottom", self.round_bottom)):
+            if reach:
                 at_least(
                     "arm",
                     f"the length of the arm beside its {name}",
-                    sloped - length,
+                    sloped - reach,
                     0.0,
-                    "use a smaller radius or a larger offset",
+                    f"use a smaller {name} or a larger offset",
                 )
         groove = layout.groove_radius
         behind = offset + self.root - groove
@@ -325,12 +334,9 @@ class Arm:
             between = polygon((0.0, 0.0), (0.0, -upright), (wall, middle))
             between += polygon((0.0, 0.0), (wall, middle), (back, middle), (back, 0.0))
             drawn += between ^ lower(min(0.0, top))
-        for radius, turn, end, tangent in (
-            (self.round_bottom, self.angle, low, -tan(0.5 * lean)),
-            (self.round_top, self.angle - 180.0, high, 1.0 / tan(0.5 * lean)),
-        ):
-            if radius:
-                drawn += _rounding((wall, back), end, radius, radius * tangent, turn)
+        for reach, end, up in ((self.round_bottom, low, -1.0), (self.round_top, high, 1.0)):
+            if reach:
+                drawn += _rounding((wall, back), end, reach, self.angle, up)
         if self.clear_top is not False:
             west = -_FAR if self.clear_top is True else wall - float(self.clear_top)
             west = max(west, r) if upright else west
@@ -395,24 +401,29 @@ Mount = Bracket | Leaf | Arm
 
 
 def _rounding(
-    wall: tuple[float, float], corner: float, radius: float, along: float, turn: float
+    wall: tuple[float, float], corner: float, reach: float, angle: float, up: float
 ) -> CrossSection:
-    """Draw what a rounding adds between the wall and a side of the arm.
+    """Draw what a rounding adds between the wall and the lower or upper side of the arm.
 
-    The circle touches the wall `along` mm above the corner, and the arm where it has gone round by
-    `turn` degrees. It reaches as deep into the wall as the arm does.
+    It is a Bézier curve of degree 4 that leaves the wall and joins the arm without curvature, and
+    it reaches as deep into the wall as the arm does.
     """
     from manifold3d import CrossSection
 
-    count = max(2, round(abs(turn) / _STEP))
-    x, y = wall[0] - radius, corner + along
-    arc = [radians(turn * index / count) for index in range(count + 1)]
-    rim = [(x + radius * cos(at), y + radius * sin(at)) for at in arc]
+    lean = radians(angle)
+    first = (wall[0], corner + up * reach)
+    last = (wall[0] - reach * sin(lean), corner + reach * cos(lean))
+    ends = np.array([first, last])
+    middle = np.array([wall[0], corner])
+    inner = middle + _SMOOTH * (ends - middle)
+    control = np.array([ends[0], inner[0], middle, inner[1], ends[1]])
+    at = np.linspace(0.0, 1.0, _POINTS)[:, None]
+    weights = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) * (1.0 - at) ** (4 - _POWERS) * at**_POWERS
     # It overlaps the arm: outlines that share a line do not unite cleanly.
-    inside = -_OVERLAP if along > 0.0 else _OVERLAP
-    end = ((px - c) * (1.0 + _OVERLAP / radius) + c for px, c in zip(rim[-1], (x, y), strict=True))
-    points = [(wall[1], corner + inside), (wall[1], y), *rim, (next(end), next(end))]
-    return CrossSection([points if turn < 0.0 else points[::-1]])
+    inside = -up * _OVERLAP
+    over = (last[0] + inside * cos(lean), last[1] + inside * sin(lean))
+    points = [(wall[1], corner + inside), (wall[1], first[1]), *(weights @ control).tolist(), over]
+    return CrossSection([points if up > 0.0 else points[::-1]])
 
 
 def corner_of(mount: Mount, layout: KnuckleLayout, gap: float) -> Point:

@@ -41,8 +41,9 @@ def test_bodies_keep_the_clearance(body):
     child = body(10).hingeChild(20, clearance=0.3)
     assert parent.solids().size() == child.solids().size() == 1
     assert parent.val().isValid()
-    assert parent.val().BoundingBox().xmax == pytest.approx(2.5)  # the barrel, on the axis
-    assert child.val().BoundingBox().ymax == pytest.approx(2.5)
+    # The barrel, on the axis; CadQuery measures on triangles where a shape has them already.
+    assert parent.val().BoundingBox().xmax == pytest.approx(2.5, abs=0.02)
+    assert child.val().BoundingBox().ymax == pytest.approx(2.5, abs=0.02)
     assert parent.val().distance(child.val()) == pytest.approx(0.3, abs=1e-6)
     assert parent.intersect(child).solids().size() == 0
     for angle in (60, 180):

@@ -6,10 +6,12 @@ import pytest
 
 pytest.importorskip("build123d")  # a newer one is tried in an environment with little else
 
+from build123d import Box, Pos
 from hinge_measure import block, exact, fitted, gap, mesh_of, overlap, single_gaps, turned
 
 from hinges import Arm, Bracket, FitError, HingeError, Leaf, LiftPin, SingleHinge, play
 from hinges.plan_single import SinglePlan, SingleSpec, plan_single
+from hinges.turn_sweep import mesh_of_part
 
 ROUND = [10.0 * step for step in range(19)]
 
@@ -74,6 +76,18 @@ def test_exact_halves_and_play():
     assert play(plan).axial == pytest.approx((0.3, 0.3))
     assert len(hinge.solids()) == 2
     assert "LiftPin(radius=1.5" in repr(hinge)
+
+
+def test_a_lid_lifts_off_its_box():
+    hinge = SingleHinge(40, knuckles=2, clearance=0.3, pin=LiftPin(1.5, at=110.0))
+    parent, child = (Pos(side * 10.075, -10.075) * Box(19.85, 19.85, 40) for side in (-1, 1))
+    box, lid = hinge.fit(parent, child)
+    pin, posed = mesh_of_part(box), mesh_of_part(lid)
+    for angle, free in ((110.0, True), (30.0, False)):
+        turned_lid = turned(posed, angle)
+        ways = [overlap(pin, turned_lid.translate((0, 0, 4.0 * step))) for step in range(1, 11)]
+        assert (max(ways) < 1e-3) == free
+    assert hinge.sweep(box, lid, ROUND).gap == pytest.approx(0.3, abs=0.01)
 
 
 @pytest.mark.parametrize(
