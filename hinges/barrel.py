@@ -209,7 +209,8 @@ def default_radii(
         with 0.3 mm clearance. Where no barrel fits, those of an eighth of the edge.
     """
     wanted = min(length / 8.0, widest)
-    for step in (0, *(sign * n for n in range(1, 21) for sign in (1, -1))):
+    wider = range(21, 61)  # on a short edge a barrel is as wide as its walls ask for
+    for step in (0, *(sign * n for n in range(1, 21) for sign in (1, -1)), *wider):
         barrel = round(wanted * (1.0 + 0.02 * step), 3)
         free = barrel + clearance.radial if margin is None else margin
         try:

@@ -5,7 +5,7 @@ Exact solids (:mod:`hinges.exact_solids`) and meshes (:mod:`hinges.mesh`) are bo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Unpack
 
@@ -87,11 +87,11 @@ class SingleSpec(BarrelSpec):
         """
         options = SingleHingeOptions(**keywords)
         length = millimetres(length, "length")
-        sizes = dict(vars(barrel_spec(options, length, options.knuckles, (0.0, options.angle))))
         if options.margin is None and not any(
             isinstance(mount, Bracket) for mount in options.mounts
         ):
-            sizes["margin"] = 0.0
+            options = replace(options, margin=0.0)
+        sizes = vars(barrel_spec(options, length, options.knuckles, (0.0, options.angle)))
         low, high, stops = _range(options)
         return cls(
             length=float(length),

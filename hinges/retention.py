@@ -244,11 +244,15 @@ class SnapSpec:
     def deflection(self) -> float:
         """How far the tongue bends as its ridge goes in: ridge less clearance, in mm.
 
-        On an arc the tongue stands outwards by then: a ridge that looks outwards is pressed by that
-        much more, one that looks towards the axis by less.
+        On an arc the tongue stands outwards by then. A ridge that looks outwards is pressed by that
+        much more, most of all in the mouth of the mortise. One that looks towards the axis is
+        pressed less, most of all just before it drops into its dimple.
         """
-        aside = self.shift(self.ridge_at)
-        return max(0.0, self.catch - self.clearance + (-aside if self.inwards else aside))
+        if self.arc is None or not self.inwards:
+            return max(0.0, self.catch - self.clearance + self.shift(self.ridge_at))
+        turn = (self._foot + self.clearance) / self.arc  # from there to the closed pose
+        aside = self.ridge_at * sin(turn) - self.arc * (1.0 - cos(turn))
+        return max(0.0, self.catch - self.clearance - aside)
 
     @property
     def strain(self) -> float:
@@ -300,6 +304,13 @@ class SnapSpec:
             self.catch - self.clearance,
             0.1,
             "use a higher catch or a smaller clearance",
+        )
+        at_least(
+            "retention",
+            "how far the ridge is pressed on its way",
+            self.deflection,
+            0.05,
+            "use a higher catch, a smaller clearance or a tongue farther from the axis",
         )
         at_least(
             "retention",

@@ -317,7 +317,7 @@ class Detents:
         self, layout: KnuckleLayout, circle: float, limits: tuple[float, float], drawn: float
     ) -> list[tuple[float, float]]:
         """Ranges of hinge angle in which the bumps run free."""
-        own = degrees(self._foot(layout) / circle)
+        own = degrees((self._foot(layout) + self._room(layout.clearance.axial)) / circle)
         blocks = sorted(
             (angle - side, angle + side)
             for angle in self.angles
