@@ -1,6 +1,7 @@
-"""Draw the pictures of docs/apart.md: python docs/draw_apart.py [KIT].
+"""Draw the pictures of docs/apart.md: python docs/draw_apart.py [KIT SCREWED].
 
-KIT is the folder of a kit printed apart; without it the sample car's is made, in some minutes.
+KIT is the folder of a kit printed apart and SCREWED that of one with ``--pin m2``; without them the
+sample car's are made, in some minutes.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ def plates(built: BuiltTree) -> None:
     write_bytes(PICTURES / "plates.png", png_bytes(image))
 
 
-def hinge(built: BuiltTree) -> None:
-    """One hinge cut open along its axis: bores, pin, web, and the way in."""
+def hinge(built: BuiltTree, picture: str) -> None:
+    """One hinge cut open along its axis: bores, pin or screw, and the way in."""
     joinery, tree = built.joinery, built.planned.tree
     pin = next(p for p in joinery.pins if abs(p.tail_mm[2] - p.tip_mm[2]) > 1.0)
     hinged = tree.hinges[pin.hinge]
@@ -72,21 +73,22 @@ def hinge(built: BuiltTree) -> None:
         paints.append(colours[body])
     look = np.degrees(np.arctan2(shift[1], shift[0]))
     view = View(azimuth_deg=float(look) + 20.0, elevation_deg=18.0, size=(520, 520), ground=False)
-    write_bytes(PICTURES / "pin.png", png_bytes(render(meshes, np.array(paints), None, view)))
+    write_bytes(PICTURES / picture, png_bytes(render(meshes, np.array(paints), None, view)))
 
 
 def main() -> None:
-    """Draw both."""
-    if len(sys.argv) > 1:
-        built = open_kit(sys.argv[1]).join()
-    else:
-        with tempfile.TemporaryDirectory() as folder:
-            kit = Kit.from_model(
-                "sample:car", folder=folder, profile="fdm-pla-0.4", effort="quick", seed=1
+    """Draw all three."""
+    with tempfile.TemporaryDirectory() as folder:
+        if len(sys.argv) > 2:
+            plain, screwed = (open_kit(path).join() for path in sys.argv[1:3])
+        else:
+            options = {"folder": folder, "profile": "fdm-pla-0.4", "effort": "quick", "seed": 1}
+            plain, screwed = (
+                Kit.from_model("sample:car", pin=pin, **options).join() for pin in ("1.75", "m2")
             )
-            built = kit.join()
-    plates(built)
-    hinge(built)
+    plates(plain)
+    hinge(plain, "pin.png")
+    hinge(screwed, "screw.png")
 
 
 if __name__ == "__main__":

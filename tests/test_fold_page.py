@@ -73,11 +73,11 @@ def wait(page: Any, seen: Callable[[], bool]) -> None:
 
 def test_buttons_keys_and_slider(page: Any, bar_kit: Any) -> None:
     count = len(bar_kit.join().planned.motion.moves) - 1
-    assert page.inner_text("#step") == "As it is printed"
+    assert page.inner_text("#step") == "The model"
     page.click("#next")
     wait(page, lambda: page.inner_text("#step").startswith("Step 2"))
     page.keyboard.press("ArrowLeft")
-    wait(page, lambda: page.inner_text("#step") == "As it is printed")
+    wait(page, lambda: page.inner_text("#step") == "The model")
     page.keyboard.press("End")
     assert page.inner_text("#step") == "Done"
     page.evaluate(

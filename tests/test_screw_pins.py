@@ -131,6 +131,16 @@ def test_voxels_that_no_screw_fits_are_refused_before_anything_is_made(voxel_mm)
         MODE.require_hinge(voxel_mm)
 
 
+def test_the_barrel_keeps_its_wall_around_a_pocket():
+    from hinges.clearance import Clearance
+
+    pin = MODE.loose_pin()
+    assert pin.pocket == pytest.approx(1.9 + 0.15)
+    assert pin.thinnest_barrel(Clearance(0.3), 0.8, 3) == pytest.approx(2.05 + 0.8)
+    plain = replace(pin, pocket=0.0)
+    assert plain.thinnest_barrel(Clearance(0.3), 0.8, 3) < 2.3
+
+
 def test_plain_pins_are_cut_to_length_and_screws_have_a_thread():
     assert [name for name, kind in PINS.items() if kind.screw] == ["m2"]
     for name, kind in PINS.items():

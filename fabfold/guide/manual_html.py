@@ -101,7 +101,7 @@ def manual_html(manual: Manual) -> str:
         "img-src data:; style-src 'unsafe-inline'\">"
         f"<title>{title}: folding manual</title><style>{_STYLE}</style></head><body>"
         f'<h1>{title}</h1><p class="sub">{escape(manual.subtitle)}</p>'
-        f"{_image(manual.cover, 'As it is printed, half-way, and folded', 'cover')}"
+        f"{_image(manual.cover, 'The model, half-way, and folded', 'cover')}"
         f"{_list('What is in the box', manual.contents)}{_list('Printing', manual.advice)}"
         f'<h2>The parts</h2><ul class="parts">{_parts(manual)}</ul>'
         f"{_magnets(manual)}{_list('Putting it together', manual.assembly, 'ol')}"

@@ -373,6 +373,6 @@ def write_kit(
     progress.update(0.8, "STEP")
     finish_step()
     progress.update(0.95, "report")
-    pictures = [("As it is printed, half-way, and folded", guide[PICTURE])]
+    pictures = [("The model, half-way, and folded", guide[PICTURE])]
     write_checks(folder, solid, built, checks, wishes, closure, mode.profile.name, pictures)
     progress.update(1.0, str(folder))
