@@ -9,6 +9,7 @@ from joinery_models import motion_of_order, posed, strip_tree
 
 from fabfold.apart.apart_kit import prepare_apart
 from fabfold.errors import RecipeError
+from fabfold.guide.advice import print_lines
 from fabfold.guide.magnet_pictures import MAGNET_PIXELS, magnet_pictures
 from fabfold.guide.pauses import print_pauses
 from fabfold.joinery.bodies import Joinery
@@ -177,6 +178,25 @@ def test_pauses_name_every_magnet_once_and_go_up(apart, everything):
     assert sum(len(p.south) for p in pauses) == len(retention.pairs)
     assert print_pauses(None, kit) == []
     assert print_pauses(replace(retention, pairs=()), kit) == []
+
+
+def test_in_place_pauses_count_from_the_lowest_point_of_the_kit(bar_kit):
+    built = bar_kit.join()
+    tree, motion, before = built.planned.tree, built.planned.motion, built.joinery
+    mode = print_mode(load_profile("polyjet"), hold=Hold("3x1", enclosed=True))
+    joinery, apart, retention = hold_kit(tree, motion, before, None, mode, SilentProgress())
+    assert apart is None
+    pauses = print_pauses(retention, None)
+    assert pauses
+    assert all(pause.plate is None for pause in pauses)
+    low = min(body.vertices[:, 2].min() for body in before.bodies)
+    for pair in retention.pairs:
+        for point, inward, pause in zip(pair.points_mm, pair.inwards, pair.pauses_mm, strict=True):
+            # On its rim the pocket ends a radius above its middle, lying at its upper face.
+            above = {0.0: 1.6, 1.0: 1.6, -1.0: -0.4}[inward[2]]
+            assert pause == pytest.approx(point[2] - low + above, abs=2e-3)
+    told = print_lines(mode, joinery, pauses)
+    assert sum(line.startswith("Pause at z = ") for line in told) == len(pauses)
 
 
 def test_retention_comes_back_from_json(everything):
