@@ -9,13 +9,26 @@ import pytest
 pytest.importorskip("build123d")  # a newer one is tried in an environment with little else
 
 import build123d as bd
+import manifold3d as m3
 from build123d import Align, Axis, Box, Part, Pos
 from hinge_environment import needs_cadquery
 from hinge_measure import exact, mesh_of, single_gaps
 
-from hinges import Arm, Bracket, FilamentPin, FitError, HingeError, Leaf, SingleHinge, Stops, play
+from hinges import (
+    Arm,
+    Bracket,
+    ConePin,
+    FilamentPin,
+    FitError,
+    HingeError,
+    Leaf,
+    SingleHinge,
+    Stops,
+    play,
+)
 from hinges.clearance import Clearance
 from hinges.knuckles import lay_out_knuckles
+from hinges.mesh import double_hinge_meshes, single_hinge_meshes
 from hinges.plan_single import SinglePlan, SingleSpec, plan_single
 from hinges.turn_sweep import mesh_of_part
 
@@ -101,6 +114,19 @@ def test_what_reaches_below_a_thin_body_is_trimmed():
     _, lid = hinge.fit(box, lid)
     assert hinge.child_half.bounding_box().min.Y < -8.0
     assert pytest.approx(-4.15) == lid.bounding_box().min.Y
+
+
+def test_as_meshes():
+    pieces = single_hinge_meshes(40, 0.3, leaf=Arm.pair(14.0))
+    plan = planned(
+        radius=pieces.barrel_radius_mm, pin=ConePin(pieces.pin_radius_mm), leaf=Arm.pair(14.0)
+    )
+    for mesh, shape in ((pieces.parent_half, plan.parent), (pieces.child_half, plan.child)):
+        solid = m3.Manifold(m3.Mesh(mesh.vertices.astype("f4"), mesh.faces.astype("u4")))
+        assert solid.status() == m3.Error.NoError
+        assert solid.volume() == pytest.approx(exact(shape).volume, rel=0.01)
+    with pytest.raises(HingeError, match="leave leaf out"):
+        double_hinge_meshes(20, 0.3, leaf=Arm())
 
 
 def test_a_loose_pin_and_play():
