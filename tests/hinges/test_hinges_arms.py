@@ -182,6 +182,21 @@ def test_a_lid_that_opens_by_270_degrees():
         hinge.fit(*bodies(hinge, 30.0, 5.0))
 
 
+def test_two_plates_with_the_axis_in_their_middle_turn_to_both_sides():
+    # flush with barrels as thick as the plates
+    flush = Arm(offset=5.0, rise=-2.15, angle=90.0, clear_top=True)
+    hinge = SingleHinge(
+        40, radius=2.0, clearance=0.3, leaf=flush, angular_range=(-130, 130), pin=ConePin(1.0)
+    )
+    plates = bodies(hinge, 4.0, 4.0)
+    parent, child = hinge.fit(*plates, check=False)
+    swept = hinge.sweep(parent, child, [-130.0 + 260.0 * step / 18 for step in range(19)])
+    assert swept.gap == pytest.approx(0.3, abs=0.01)
+    assert swept.worst.overlap == 0.0
+    with pytest.raises(HingeError, match=r"below -90° the child goes on under its parent"):
+        hinge.fit(bodies(hinge, 30.0, 4.0)[0], plates[1])
+
+
 @pytest.mark.parametrize(
     ("options", "rule", "words"),
     [
@@ -195,7 +210,7 @@ def test_a_lid_that_opens_by_270_degrees():
         ({"leaf": Arm(rise=-1.0)}, "range", "the two tops at 180° is -1.7 mm"),
         ({"leaf": Arm(), "opens": 270, "closed": 180}, "arm", "at -90°"),
         ({"opens": 270, "closed": 180}, "range", r"an axis outside of both bodies, on leaf=Arm"),
-        ({"leaf": Arm(**FLAT), "angular_range": (-120, 90)}, "range", "the wall of its parent"),
+        ({"leaf": Arm(**FLAT), "angular_range": (-120, 170)}, "range", "the turn is 290 °"),
         ({"leaf": Arm(**FLAT), "angular_range": (0, 200)}, "range", "the high end of the range"),
     ],
     ids=str,
