@@ -2,7 +2,8 @@
 
 Each body is taken to fill the quadrant that its mount leaves it, but for the groove of the barrel.
 Below 0° a body that large meets everything; there the child is taken to be as thick as the foot of
-its arm, and the turn of the bodies themselves is looked at when the hinge is let into them.
+its arm, and below -90° the parent too. The turn of the bodies themselves is looked at when the
+hinge is let into them.
 """
 
 from __future__ import annotations
@@ -74,46 +75,34 @@ def check_arms(
     inside = _angles(max(low, 0.0), min(high, 180.0))
     larger = "use a larger offset, a taller height, clear_top=True, or a smaller range"
     parent, child = (_mirrored(bodies[0]), bodies[1])
-    if arms[1] is not None:
-        for angle in (*_angles(low, 0.0), *inside):
-            _keep_apart(
-                "the child's arm beside the parent",
-                arms[1].rotate(angle),
-                parent,
-                room,
-                angle,
-                larger,
-            )
-    if arms[0] is not None:
-        for angle in inside:
-            _keep_apart(
-                "the parent's arm beside the child",
-                _mirrored(arms[0]).rotate(-angle),
-                child,
-                room,
-                angle,
-                larger,
-            )
-    if low < 0.0 and isinstance(mounts[1], Arm):
-        foot = mounts[1].foot(layout, gap)
-        least = _box(corners[1][0], _FAR, foot[0], -corners[1][1])
-        for angle in _angles(low, 0.0):
-            turned = least.rotate(angle)
+    for angle in (*_angles(low, 0.0), *inside):
+        if arms[1] is not None:
+            beside = parent if angle >= -90.0 else _mirrored(_foot(mounts[0], layout, gap))
+            what = "the child's arm beside the parent"
+            _keep_apart(what, arms[1].rotate(angle), beside, room, angle, larger)
+        if arms[0] is not None and angle >= 0.0:
+            turned = _mirrored(arms[0]).rotate(-angle)
+            _keep_apart("the parent's arm beside the child", turned, child, room, angle, larger)
+        if arms[0] is not None and angle < 0.0:
+            turned = _foot(mounts[1], layout, gap).rotate(angle)
+            beside = parent if angle >= -90.0 else _mirrored(_foot(mounts[0], layout, gap))
             advice = (
                 "use a larger offset of the parent, or a child's arm with a smaller foot "
                 "(angle=90, clear_top=True)"
             )
-            _keep_apart("the child beside the parent", turned, parent, room, angle, advice)
-            if arms[0] is not None:
-                advice = "use a larger offset of the child, or angle=90 and clear_top=True"
-                _keep_apart(
-                    "the child beside the parent's arm",
-                    turned,
-                    _mirrored(arms[0]),
-                    room,
-                    angle,
-                    advice,
-                )
+            _keep_apart("the child beside the parent", turned, beside, room, angle, advice)
+            advice = "use a larger offset of the child, or angle=90 and clear_top=True"
+            what = "the child beside the parent's arm"
+            _keep_apart(what, turned, _mirrored(arms[0]), room, angle, advice)
+
+
+def _foot(mount: Mount, layout: KnuckleLayout, gap: float) -> CrossSection:
+    """The least body of a child that stands on its arm: as thick as the arm's foot."""
+    from manifold3d import CrossSection
+
+    near, _, _, bottom = mount.limits(layout, gap)
+    least = _box(near, _FAR, -bottom, -corner_of(mount, layout, gap)[1])
+    return least - CrossSection.circle(layout.groove_radius, 128)
 
 
 def _angles(low: float, high: float) -> Sequence[float]:

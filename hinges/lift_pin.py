@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import cos, degrees, hypot, radians, sin
+from math import asin, cos, degrees, hypot, radians, sin
 from typing import ClassVar
 
 from .clearance import Clearance, number
@@ -120,6 +120,24 @@ class LiftPin(Pin):
             Along +z in mm.
         """
         return self.tip(layout) - layout.knuckles[1].start
+
+    def window(self, layout: KnuckleLayout) -> float:
+        """How far beside the angles of `at` the tooth still passes its keyway.
+
+        Parameters
+        ----------
+        layout : KnuckleLayout
+            The knuckles of the axis.
+
+        Returns
+        -------
+        float
+            To either side, in degrees; 180 where there is no tooth.
+        """
+        if self.at is None:
+            return 180.0
+        room = layout.clearance.radial
+        return degrees(asin(min(1.0, room / (self.radius + self._tooth(layout.clearance)))))
 
     def largest_radius(self, layout: KnuckleLayout, bore_form: BoreForm) -> float:
         """Largest radius in mm that the pin takes out of a barrel."""

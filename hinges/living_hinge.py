@@ -104,6 +104,9 @@ class LivingHinge(BasePartObject):  # type: ignore[misc]
         Of the bent web at its middle, mm.
     gap : float
         Distance of the groove's sides when it is folded, mm.
+    outside : float
+        How far beyond the middle of the fold the lower faces of both sides meet when it is folded,
+        mm.
     life : FlexLife
         What to expect of the material.
 
@@ -180,6 +183,11 @@ class LivingHinge(BasePartObject):  # type: ignore[misc]
     def radius(self) -> float:
         """Radius of the bent web at its middle, mm."""
         return self.land / radians(self.angle)
+
+    @property
+    def outside(self) -> float:
+        """How far beyond the middle of the fold the lower faces meet when it is folded, mm."""
+        return (self.radius + 0.5 * self.web) * tan(0.5 * radians(self.angle)) - 0.5 * self.land
 
     @property
     def gap(self) -> float:

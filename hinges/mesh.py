@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 
 from .barrel import default_pin_radius, default_radii
 from .clearance import Clearance
+from .exceptions import HingeError
 from .joint_play import Play, play
 from .leaf import Bracket
 from .options import BarrelKeywords, MeshKeywords, MeshOptions
@@ -332,8 +333,9 @@ def _sizes(voxel_mm: float, clearance_mm: float, knuckles: int, options: MeshOpt
     )
 
 
-def _plan(voxel_mm: float, knuckles: int, sizes: _Sizes) -> SinglePlan:
-    spec = SingleSpec.read(voxel_mm, knuckles=knuckles, leaf=sizes.bracket, **sizes.keywords)
+def _plan(voxel_mm: float, knuckles: int, sizes: _Sizes, options: MeshOptions) -> SinglePlan:
+    leaf = sizes.bracket if options.leaf is None else options.leaf
+    spec = SingleSpec.read(voxel_mm, knuckles=knuckles, leaf=leaf, **sizes.keywords)
     return plan_single(spec)
 
 
@@ -369,8 +371,9 @@ def single_hinge_play(
     >>> round(single_hinge_play(20, 0.3, 180).axial[1], 3)
     0.3
     """
-    sizes = _sizes(float(voxel_mm), float(clearance_mm), knuckles, MeshOptions(**options))
-    return play(_plan(float(voxel_mm), knuckles, sizes), angle)
+    asked = MeshOptions(**options)
+    sizes = _sizes(float(voxel_mm), float(clearance_mm), knuckles, asked)
+    return play(_plan(float(voxel_mm), knuckles, sizes, asked), angle)
 
 
 @lru_cache(maxsize=64)
@@ -378,7 +381,7 @@ def _single(
     voxel_mm: float, clearance_mm: float, knuckles: int, options: MeshOptions
 ) -> HingeMeshes:
     sizes = _sizes(voxel_mm, clearance_mm, knuckles, options)
-    plan = _plan(voxel_mm, knuckles, sizes)
+    plan = _plan(voxel_mm, knuckles, sizes, options)
     parent, parent_carve = half_manifolds(plan.parent, options.segments)
     child, child_carve = half_manifolds(plan.child, options.segments)
     return HingeMeshes(
@@ -467,6 +470,8 @@ def _double(
     plate_mm: float | None,
     options: MeshOptions,
 ) -> DoubleHingeMeshes:
+    if options.leaf is not None:
+        raise HingeError("a double hinge stands on brackets: leave leaf out")
     sizes = _sizes(voxel_mm, clearance_mm, knuckles, options)
     spec = DoubleSpec.read(
         voxel_mm,

@@ -221,6 +221,7 @@ class MeshKeywords(TypedDict, total=False):
     wall_mm: float
     segments: int
     pin: LoosePin | None
+    leaf: Mount | tuple[Mount, Mount] | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,6 +251,8 @@ class MeshOptions:
     pin : LoosePin, optional
         A pin that is put in after printing, in place of printed cones; `pin_radius_mm` is then its
         own.
+    leaf : Bracket, Leaf or Arm, or a pair of them, optional
+        What joins the knuckles of a single hinge to their bodies, in place of the bracket.
     """
 
     barrel_radius_mm: float | None = None
@@ -260,6 +263,7 @@ class MeshOptions:
     wall_mm: float = 0.8
     segments: int = 64
     pin: LoosePin | None = None
+    leaf: Mount | tuple[Mount, Mount] | None = None
 
 
 def call_of(name: str, size: object, asked: Mapping[str, object], options: BarrelOptions) -> str:

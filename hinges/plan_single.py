@@ -153,12 +153,9 @@ def _check_turn(spec: SingleSpec, layout: KnuckleLayout) -> None:
     low, high = spec.angular_range
     advice = "the child's quadrant lies beside the parent's at 0° and on it at 180°"
     outside = all(isinstance(mount, Arm) for mount in spec.mounts)
-    below = (
-        "lower the child meets the wall of its parent"
-        if outside
-        else f"{advice}; below 0° it turns on an axis outside of both bodies, on leaf=Arm(...)"
-    )
-    at_least("range", "the low end of the range", low, -90.0 if outside else 0.0, below, "°")
+    below = f"{advice}; below 0° it turns on an axis outside of both bodies, on leaf=Arm(...)"
+    at_least("range", "the low end of the range", low, -180.0 if outside else 0.0, below, "°")
+    at_most("range", "the turn", high - low, 270.0, "give (low, high) in degrees", "°")
     at_most("range", "the high end of the range", high, 180.0, advice, "°")
     at_least("range", "the turn", high - low, 1.0, "give (low, high) in degrees", "°")
     inside = "draw the hinge inside its range, and off its stops"

@@ -105,7 +105,7 @@ class SingleHinge(PlacedPart):
     angle : float
         Angle in degrees at which it is drawn and printed.
     angular_range : (float, float)
-        Lowest and highest angle in degrees, within 0 to 180; from -90 on with arms.
+        Lowest and highest angle in degrees, within 0 to 180; down to -180 with arms.
     opens : float, optional
         How far it opens, in degrees from the closed pose, with a stop there; in place of
         `angular_range` and `stops`. Beyond 180 with arms, which have no stop.

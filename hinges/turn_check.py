@@ -61,6 +61,9 @@ def require_turn(spec: SingleSpec, parent: Part, child: Part, joint: str) -> Non
         advice = (
             "below 0° the child hangs beside the wall of its parent, which its thickness takes: "
             f"give the parent's arm an offset of {offset:.3g} mm or more"
+            if worst.angle >= -90.0
+            else "below -90° the child goes on under its parent: that takes a thin parent, or a "
+            "range that ends before"
         )
     elif tops[high] > spec.radius + 0.1 and not spec.on_arms:
         advice = (

@@ -9,13 +9,26 @@ import pytest
 pytest.importorskip("build123d")  # a newer one is tried in an environment with little else
 
 import build123d as bd
+import manifold3d as m3
 from build123d import Align, Axis, Box, Part, Pos
 from hinge_environment import needs_cadquery
 from hinge_measure import exact, mesh_of, single_gaps
 
-from hinges import Arm, Bracket, FilamentPin, FitError, HingeError, Leaf, SingleHinge, Stops, play
+from hinges import (
+    Arm,
+    Bracket,
+    ConePin,
+    FilamentPin,
+    FitError,
+    HingeError,
+    Leaf,
+    SingleHinge,
+    Stops,
+    play,
+)
 from hinges.clearance import Clearance
 from hinges.knuckles import lay_out_knuckles
+from hinges.mesh import double_hinge_meshes, single_hinge_meshes
 from hinges.plan_single import SinglePlan, SingleSpec, plan_single
 from hinges.turn_sweep import mesh_of_part
 
@@ -103,6 +116,19 @@ def test_what_reaches_below_a_thin_body_is_trimmed():
     assert pytest.approx(-4.15) == lid.bounding_box().min.Y
 
 
+def test_as_meshes():
+    pieces = single_hinge_meshes(40, 0.3, leaf=Arm.pair(14.0))
+    plan = planned(
+        radius=pieces.barrel_radius_mm, pin=ConePin(pieces.pin_radius_mm), leaf=Arm.pair(14.0)
+    )
+    for mesh, shape in ((pieces.parent_half, plan.parent), (pieces.child_half, plan.child)):
+        solid = m3.Manifold(m3.Mesh(mesh.vertices.astype("f4"), mesh.faces.astype("u4")))
+        assert solid.status() == m3.Error.NoError
+        assert solid.volume() == pytest.approx(exact(shape).volume, rel=0.01)
+    with pytest.raises(HingeError, match="leave leaf out"):
+        double_hinge_meshes(20, 0.3, leaf=Arm())
+
+
 def test_a_loose_pin_and_play():
     hinge = SingleHinge(60, knuckles=5, pin=FilamentPin(), clearance=0.3, leaf=Arm.pair(12.0))
     assert play(hinge).radial == pytest.approx(0.2)
@@ -156,6 +182,21 @@ def test_a_lid_that_opens_by_270_degrees():
         hinge.fit(*bodies(hinge, 30.0, 5.0))
 
 
+def test_two_plates_with_the_axis_in_their_middle_turn_to_both_sides():
+    # flush with barrels as thick as the plates
+    flush = Arm(offset=5.0, rise=-2.15, angle=90.0, clear_top=True)
+    hinge = SingleHinge(
+        40, radius=2.0, clearance=0.3, leaf=flush, angular_range=(-130, 130), pin=ConePin(1.0)
+    )
+    plates = bodies(hinge, 4.0, 4.0)
+    parent, child = hinge.fit(*plates, check=False)
+    swept = hinge.sweep(parent, child, [-130.0 + 260.0 * step / 18 for step in range(19)])
+    assert swept.gap == pytest.approx(0.3, abs=0.01)
+    assert swept.worst.overlap == 0.0
+    with pytest.raises(HingeError, match=r"below -90° the child goes on under its parent"):
+        hinge.fit(bodies(hinge, 30.0, 4.0)[0], plates[1])
+
+
 @pytest.mark.parametrize(
     ("options", "rule", "words"),
     [
@@ -169,7 +210,7 @@ def test_a_lid_that_opens_by_270_degrees():
         ({"leaf": Arm(rise=-1.0)}, "range", "the two tops at 180° is -1.7 mm"),
         ({"leaf": Arm(), "opens": 270, "closed": 180}, "arm", "at -90°"),
         ({"opens": 270, "closed": 180}, "range", r"an axis outside of both bodies, on leaf=Arm"),
-        ({"leaf": Arm(**FLAT), "angular_range": (-120, 90)}, "range", "the wall of its parent"),
+        ({"leaf": Arm(**FLAT), "angular_range": (-120, 170)}, "range", "the turn is 290 °"),
         ({"leaf": Arm(**FLAT), "angular_range": (0, 200)}, "range", "the high end of the range"),
     ],
     ids=str,

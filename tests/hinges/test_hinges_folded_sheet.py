@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from itertools import combinations
+from math import acos, cos, degrees, radians, sin, sqrt
 
 import pytest
 
 pytest.importorskip("build123d")  # a newer one is tried in an environment with little else
 
-from build123d import Align, Box, BuildPart, Compound, Part, Pos
+from build123d import Align, Box, BuildPart, Compound, Mode, Part, Pos
 
-from hinges import FitError, FoldedSheet, FoldSnap, HingeError
+from hinges import FitError, FoldedSheet, FoldSnap, HingeError, LivingHinge
+from hinges.exact_solids import build_all
 from hinges.fold_snap import Bend
+from hinges.shapes import Prism
 from hinges.turn_sweep import mesh_of_part
 
 LYING = (Align.CENTER, Align.CENTER, Align.MIN)
@@ -169,6 +172,46 @@ def test_snaps_of_a_seam_are_counted_the_same_way_on_both_edges():
     sheet = FoldedSheet.tray(60, 50, 25, use="few", places=(0.6,))
     assert measured(sheet.folded) == (pytest.approx(0.05, abs=0.01), 0.0)
     assert len(held_pairs(sheet)) == 8
+
+
+@pytest.mark.slow
+def test_a_tetrahedron_whose_faces_meet_in_seams():
+    side, thick, angle = 70.0, 2.0, degrees(acos(-1.0 / 3.0))
+    groove = LivingHinge(10, thick, angle=angle, use="few", mode=Mode.PRIVATE)
+    bend = Bend(angle, thick, groove.land, groove.web)
+    mouth = 0.5 * groove.land + (thick - groove.web) * bend.lean
+    assert groove.outside == pytest.approx(bend.outside)
+    fold_at = side / (2.0 * sqrt(3.0)) - groove.outside
+    apex, foot = fold_at - groove.outside + 0.5 * sqrt(3.0) * side, fold_at + mouth
+    half, narrow = (apex - foot) / sqrt(3.0), 0.5 * side - 2.0 * mouth - 3.0
+
+    def spun(x: float, y: float, turn: int) -> tuple[float, float]:
+        at = radians(120.0 * turn)
+        return x * cos(at) - y * sin(at), x * sin(at) + y * cos(at)
+
+    rim = [(fold_at, -narrow), (foot, -narrow), (foot, -half), (apex, 0.0)]
+    rim += [(x, -y) for x, y in reversed(rim[:3])]
+    turns = range(3)
+    outlines = [[spun(*point, turn) for point in rim] for turn in turns]
+    outlines.append([spun(fold_at, y, turn) for turn in turns for y in (-narrow, narrow)])
+    plate = build_all([Prism(tuple(outline), 0.0, thick) for outline in outlines])
+    folds = [tuple(spun(fold_at, y, turn) for y in (-narrow, narrow)) for turn in turns]
+    seams = [
+        tuple(
+            (spun(foot, way * half, which), spun(apex, 0.0, which))
+            for way, which in ((1.0, turn), (-1.0, turn + 1))
+        )
+        for turn in turns
+    ]
+    sheet = FoldedSheet(plate, folds, angle=angle, seams=seams, use="few")
+    assert len(sheet.flat.solids()) == 1
+    assert len(sheet.folded) == 4
+    assert measured(sheet.folded)[1] == 0.0
+    assert len(held_pairs(sheet)) == 6
+    # as high as a tetrahedron, but for the tip that the bevels take
+    assert max(face.bounding_box().max.Z for face in sheet.folded) == pytest.approx(
+        side * sqrt(2.0 / 3.0), abs=1.0
+    )
 
 
 def test_lock_and_sockets_for_a_sheet_of_ones_own():

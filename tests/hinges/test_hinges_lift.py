@@ -67,6 +67,19 @@ def test_the_tooth_holds_however_the_child_leans():
         assert overlap(parent, leaning.translate((0, 0, 1.0))) > 0.05
 
 
+def test_the_window_beside_its_angle():
+    pin = LiftPin(1.5, at=90.0)
+    plan = planned(pin, leaf=Leaf(12.0))
+    parent, child = mesh_of(plan.parent), mesh_of(plan.child)
+    window = pin.window(plan.layout)
+    assert 3.0 < window < 10.0
+    for side in (-1.0, 1.0):
+        for share, free in ((0.95, True), (1.3, False)):
+            posed = turned(child, 90.0 + side * share * window).translate((0.0, 0.0, 1.0))
+            assert (overlap(parent, posed) < 1e-6) == free
+    assert LiftPin(1.5).window(plan.layout) == 180.0
+
+
 def test_exact_halves_and_play():
     plan = planned(LiftPin(1.5, at=90.0), leaf=Leaf(12.0))
     for half, shape in (("parent", plan.parent), ("child", plan.child)):
