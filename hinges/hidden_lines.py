@@ -26,7 +26,8 @@ _CREASE = 20.0
 _SIDE = 1e-6
 #: What stands less than this before a line does not hide it, in mm.
 _BEFORE = 1e-3
-_AT_ONCE = 256  # how many points are looked at together
+_SQUARE = 6.0  # side of the squares of the drawing whose lines are looked at together, mm
+_AT_ONCE = 256  # how many at most
 
 
 @dataclass(frozen=True)
@@ -116,15 +117,40 @@ def _seen(meshes: Sequence[MeshPart], eye: Floats, up: Floats) -> _View:
 
 def _crossings(starts: Floats, ends: Floats, view: _View) -> list[Floats]:
     """Where outlines cross each edge in the drawing: shares of its length, 0 and 1 among them."""
-    from_, to = (view.points[view.outlines[:, side], :2] for side in (0, 1))
-    along, across = (ends - starts)[:, None, :2], (to - from_)[None]
-    gap = from_[None] - starts[:, None, :2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        area = along[..., 0] * across[..., 1] - along[..., 1] * across[..., 0]
-        mine = (gap[..., 0] * across[..., 1] - gap[..., 1] * across[..., 0]) / area
-        theirs = (gap[..., 0] * along[..., 1] - gap[..., 1] * along[..., 0]) / area
-        met = (theirs > -1e-9) & (theirs < 1.0 + 1e-9) & (mine > 1e-6) & (mine < 1.0 - 1e-6)
-    return [np.unique([0.0, 1.0, *row[hit]]) for row, hit in zip(mine, met, strict=True)]
+    bars = np.stack([view.points[view.outlines[:, side], :2] for side in (0, 1)])
+    edges = np.stack([starts[:, :2], ends[:, :2]])
+    low, high = bars.min(axis=0), bars.max(axis=0)
+    found: list[Floats] = [np.array([0.0, 1.0])] * len(starts)
+    for some in _neighbours(edges.min(axis=0)):
+        here = edges[:, some]
+        first, last = here.min(axis=(0, 1)), here.max(axis=(0, 1))
+        near = ((low <= last) & (high >= first)).all(axis=1)
+        along = (here[1] - here[0])[:, None]
+        across = (bars[1] - bars[0])[None, near]
+        gap = bars[0][None, near] - here[0][:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            area = _cross(along, across)
+            mine, theirs = _cross(gap, across) / area, _cross(gap, along) / area
+            met = (theirs > -1e-9) & (theirs < 1.0 + 1e-9) & (mine > 1e-6) & (mine < 1.0 - 1e-6)
+        for edge, shares, hit in zip(some, mine, met, strict=True):
+            if hit.any():
+                found[edge] = np.unique([0.0, 1.0, *shares[hit]])
+    return found
+
+
+def _neighbours(points: Floats) -> list[NDArray[np.int64]]:
+    """Numbers of points in groups that lie near each other: squares of the drawing, cut small."""
+    cells = np.floor(points[:, :2] / _SQUARE).astype(np.int64)
+    _, owner = np.unique(cells, axis=0, return_inverse=True)
+    order = np.argsort(owner.ravel(), kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(owner.ravel()[order])) + 1)
+    return [part for g in groups for part in np.split(g, range(_AT_ONCE, len(g), _AT_ONCE))]
+
+
+def _cross(one: Floats, other: Floats) -> Floats:
+    """Cross products of directions in the drawing."""
+    made: Floats = one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]
+    return made
 
 
 def _hidden(points: Floats, view: _View) -> NDArray[np.bool_]:
@@ -132,8 +158,7 @@ def _hidden(points: Floats, view: _View) -> NDArray[np.bool_]:
     hidden = np.zeros(len(points), dtype=bool)
     corners = view.points[view.faces]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    order = np.argsort(points[:, 0])
-    for some in np.split(order, range(_AT_ONCE, len(order), _AT_ONCE)):
+    for some in _neighbours(points):
         here = points[some]
         near = (
             (low[:, :2] <= here[:, :2].max(axis=0)).all(axis=1)
@@ -151,6 +176,4 @@ def _hidden(points: Floats, view: _View) -> NDArray[np.bool_]:
 
 def _doubled(a: Floats, b: Floats, c: Floats) -> Floats:
     """Twice the area of triangles in the drawing, counter-clockwise ones above 0."""
-    one, other = b - a, c - a
-    doubled: Floats = one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]
-    return doubled
+    return _cross(b - a, c - a)

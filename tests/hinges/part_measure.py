@@ -15,7 +15,7 @@ def solid_mesh(part) -> m3.Manifold:
     """The mesh of a part; each of its solids must close."""
     pieces = []
     for solid in part.solids():
-        corners, faces = solid.tessellate(FINE, 0.1)
+        corners, faces = solid.tessellate(FINE, 0.15)
         points = np.array([tuple(corner) for corner in corners])
         _, first, back = np.unique(
             np.round(points, 6), axis=0, return_index=True, return_inverse=True
@@ -34,16 +34,20 @@ def sound(*parts) -> bool:
     return all(len(part.solids()) == 1 and part.solid().is_valid for part in parts)
 
 
-def gap(one, other, up_to=1.5) -> float:
+def _mesh_gap(one: m3.Manifold, other: m3.Manifold, up_to: float) -> float:
+    shared = (one ^ other).volume()
+    return -shared if shared > 1e-6 else one.min_gap(other, up_to)
+
+
+def gap(one, other, up_to=0.6) -> float:
     """Smallest distance of two parts, mm; below 0 where they share volume: minus mm³."""
-    first, second = solid_mesh(one), solid_mesh(other)
-    shared = (first ^ second).volume()
-    return -shared if shared > 1e-6 else first.min_gap(second, up_to)
+    return _mesh_gap(solid_mesh(one), solid_mesh(other), up_to)
 
 
-def least_gap(*parts, up_to=1.5) -> float:
+def least_gap(*parts, up_to=0.6) -> float:
     """Smallest gap of any two of several parts."""
-    return min(gap(one, other, up_to) for one, other in combinations(parts, 2))
+    pairs = combinations([solid_mesh(part) for part in parts], 2)
+    return min(_mesh_gap(one, other, up_to) for one, other in pairs)
 
 
 def overhang(part, up=(0.0, 0.0, 1.0), steepest=46.0) -> float:

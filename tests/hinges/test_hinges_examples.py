@@ -1,25 +1,17 @@
 """The examples of hinges run, and what they make is sound."""
 
-import importlib.util
 import re
 from itertools import combinations
 from pathlib import Path
 
 import pytest
 from hinge_environment import needs_cadquery
+from hinge_examples import load
 
 ROOT = Path(__file__).parents[2]
-HOME = ROOT / "examples"
 
 
 BLOCKS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "hinges.md").read_text("utf-8"), re.S)
-
-
-def load(name):
-    spec = importlib.util.spec_from_file_location(f"example_{name}", HOME / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def apart(one, other):

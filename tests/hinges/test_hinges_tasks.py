@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import replace
 
 import lib3mf
 import manifold3d as m3
@@ -11,19 +12,15 @@ from build123d import (
     Align,
     Axis,
     Box,
-    BuildPart,
-    BuildSketch,
     GeomType,
     Part,
     Plane,
     Pos,
-    RectangleRounded,
     Rot,
-    extrude,
     import_step,
-    loft,
 )
 from hinge_environment import needs_cadquery
+from hinge_examples import load
 from part_measure import gap, least_gap, overhang, sound
 
 from hinges import (
@@ -38,8 +35,6 @@ from hinges import (
     RodPin,
     ScrewPin,
     SingleHinge,
-    SnapDimple,
-    SnapSpec,
     SnapTongue,
     hinge_location,
     write_3mf,
@@ -82,58 +77,43 @@ def boxes():
 
 
 @pytest.mark.slow
-def test_a_case_for_a_board_with_walls_of_two_mm():
-    """A case of 90 x 60 x 20 mm and its lid print open, side by side, without support."""
-    step = 0.5 * 60.3
-    case, lid = Pos(0, -step) * tray(90, 60, 20, 2), Pos(0, step) * tray(90, 60, 20, 2)
-    plain = overhang(case)
-    hinge = SingleHinge(90, knuckles=5, clearance=0.3, leaf=Bracket(gusset=True))
-    place = hinge_location((0, 0, 20.15), along=(1, 0, 0), outwards=(0, 0, 1))
-    case, lid = hinge.fit(case, lid, place)
+def test_a_case_for_a_board_with_walls_of_two_mm_opens_by_110_degrees():
+    example = load("11_board_case_build123d")
+    plain = overhang(example.case())
+    case, lid = example.main()
     assert sound(case, lid)
-    pocket = 2 * np.pi * 1.4**2 * 4  # the upper halves of recesses, and the tips of pins
-    assert overhang(case) < plain + 5 * pocket
-    board = Pos(0, -step, 2.1) * Box(85.6, 53.98, 1.6, align=LOW)
-    assert gap(case, board) == pytest.approx(0.1, abs=0.01)  # nothing stands in its way below
-    assert gaps(case, lid, ANGLES) == pytest.approx([0.3] * 5, abs=0.01)
+    assert case.joints["hinge"].angular_range == (70.0, 180.0)
+    recesses = 5 * 2 * np.pi * 1.4**2 * 4  # the upper halves of cones
+    assert overhang(case) < plain + recesses
+    board = Pos(0, -31.15, 5.1) * Box(85, 56, 1.6, align=LOW)
+    assert gap(case, board) == pytest.approx(0.1, abs=0.01)  # on its posts, clear of the hinge
+    assert gaps(case, lid, (90, 135, 180)) == pytest.approx([0.3] * 3, abs=0.01)
+    assert gap(case, turned(case, lid, 70)) == pytest.approx(0.0, abs=0.005)  # on its stop
+    assert 0.0 < gap(case, turned(case, lid, 70.5)) < 0.1
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pin", [None, FilamentPin()], ids=["in place", "filament"])
-def test_a_gridfinity_box_of_two_by_one_with_a_lid(pin):
-    box, lid, place = gridfinity()
-    hinge = SingleHinge(70, knuckles=5, clearance=0.3, pin=pin, leaf=Bracket(gusset=True))
+def test_a_gridfinity_box_of_two_by_one_with_a_pin_of_filament():
+    box, lid, pin = load("12_gridfinity_box_build123d").main()
+    assert sound(box, lid)
+    assert pytest.approx(83.5) == box.bounding_box().size.X
+    assert gaps(box, lid, ANGLES) == pytest.approx([0.3] * 5, abs=0.01)
+    assert gap(box, pin) == pytest.approx(0.05, abs=0.01)  # gripped
+    assert gap(lid, pin) == pytest.approx(0.15, abs=0.01)  # free
+
+
+@pytest.mark.slow
+def test_the_gridfinity_box_in_place():
+    example = load("12_gridfinity_box_build123d")
+    step, high = 0.5 * (example.DEEP + 0.3), 30.0
+    box, lid = Pos(0, -step) * example.tray(2.2, high), Pos(0, step) * example.tray(1.2, high)
+    hinge = SingleHinge(71.5, knuckles=5, clearance=0.3, leaf=Bracket(gusset=True))
+    place = hinge_location((0, 0, high + 0.15), along=(1, 0, 0), outwards=(0, 0, 1))
     box, lid = hinge.fit(box, lid, place)
     assert sound(box, lid)
     assert gaps(box, lid, ANGLES) == pytest.approx([0.3] * 5, abs=0.01)
-    if pin is not None:
-        loose = hinge.hardware.moved(place)
-        assert gap(box, loose) == pytest.approx(0.05, abs=0.01)  # gripped
-        assert gap(lid, loose) == pytest.approx(0.15, abs=0.01)  # free
     closed = turned(box, lid, 180).bounding_box()
     assert pytest.approx(41.5 + 0.15 + hinge.spec.radius) == closed.size.Y  # the barrel is behind
-
-
-def gridfinity():
-    """Feet of 42 mm pitch below a box of 83.5 x 41.5 x 42 mm with walls of 1.2 mm."""
-    wide, deep, high, rim = 83.5, 41.5, 42.0, 6.0
-    with BuildPart() as foot:
-        for low, high_, size, more in ((0.0, 0.8, 35.6, 1.6), (2.6, 4.75, 37.2, 4.3)):
-            with BuildSketch(Plane.XY.offset(low)):
-                RectangleRounded(size, size, 0.8 if low == 0.0 else 1.6)
-            with BuildSketch(Plane.XY.offset(high_)):
-                RectangleRounded(size + more, size + more, 1.6 if low == 0.0 else 3.75)
-            loft()
-        with BuildSketch(Plane.XY.offset(0.8)):
-            RectangleRounded(37.2, 37.2, 1.6)
-        extrude(amount=1.8)
-    box = Pos(0, 0, 4.75) * extrude(RectangleRounded(wide, deep, 3.75), high - 4.75)
-    box += [Pos(x) * foot.part for x in (-21, 21)]
-    hollow = extrude(RectangleRounded(wide - 2.4, deep - 2.4, 2.55), high)
-    lid = extrude(RectangleRounded(wide, deep, 3.75), rim) - Pos(0, 0, 1.2) * hollow
-    step = 0.5 * (deep + 0.3)
-    place = hinge_location((0, 0, high + 0.15), along=(1, 0, 0), outwards=(0, 0, 1))
-    return Pos(0, -step) * (box - Pos(0, 0, 7) * hollow), Pos(0, step, high - rim) * lid, place
 
 
 @pytest.mark.slow
@@ -144,9 +124,10 @@ def test_a_piano_hinge_of_31_knuckles():
     parent, child = hinge.parent_half, hinge.child_half
     assert sound(parent, child)
     assert len(hinge.plan.layout.knuckles) == 31
-    assert gaps(parent, child, (0, 90, 180)) == pytest.approx([0.3] * 3, abs=0.01)
+    assert gaps(parent, child, (0, 120)) == pytest.approx([0.3] * 2, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_hinge_of_eight_mm_for_eyeglasses():
     printed = SingleHinge(8, clearance=0.15, leaf=Leaf(6, 1.2))  # the barrel is as wide as it must
     assert printed.spec.radius == pytest.approx(1.6, abs=0.05)
@@ -168,22 +149,6 @@ def test_a_cabinet_hinge_with_holes_for_screws():
     assert gap(parent, hinge.hardware) == pytest.approx(0.02, abs=0.01)
     assert gap(child, hinge.hardware) == pytest.approx(0.12, abs=0.01)
     assert gaps(parent, child, ANGLES) == pytest.approx([0.4] * 5, abs=0.01)
-
-
-@pytest.mark.slow
-def test_a_lid_that_stops_at_110_degrees():
-    """It is drawn and printed half open; closed it lies on its box, at 180."""
-    box = Pos(0, -20.15) * tray(60, 40, 30, 2.4)
-    flat = Pos(0, 20.15, 26) * Box(60, 40, 4, align=LOW)
-    lid = flat.rotate(Axis((0, 0, 30.15), (1, 0, 0)), 120)
-    place = hinge_location((0, 0, 30.15), along=(1, 0, 0), outwards=(0, 0, 1))
-    hinge = SingleHinge(60, knuckles=5, clearance=0.3, opens=110, closed=180, angle=120)
-    box, lid = hinge.fit(box, lid, place)
-    assert sound(box, lid)
-    assert box.joints["hinge"].angular_range == (70.0, 180.0)
-    assert gaps(box, lid, (90, 120, 150, 180)) == pytest.approx([0.3] * 4, abs=0.01)
-    assert gap(box, turned(box, lid, 70)) == pytest.approx(0.0, abs=0.005)  # on its stop
-    assert 0.0 < gap(box, turned(box, lid, 70.5)) < 0.1
 
 
 @pytest.mark.slow
@@ -213,23 +178,16 @@ def test_a_lid_that_stays_where_it_is_let_go():
 
 @pytest.mark.slow
 def test_a_chain_of_five_doubles_folds_by_its_joints_alone():
-    bodies = [Pos(20 * n) * Box(19.7, 19.7, 19.7) for n in range(6)]
-    links = []
-    for n, edge in enumerate("yzyzy"):
-        hinge = DoubleHinge(20, clearance=0.3, first=f"+{edge}", second=f"-{edge}")
-        fitted = hinge.fit(*bodies[n : n + 2], Pos(20 * n + 10), joint=f"link {n}")
-        bodies[n], link, bodies[n + 1] = fitted
-        links.append(link)
-    assert sound(*bodies, *links)
-    assert least_gap(*bodies, *links, up_to=0.4) == pytest.approx(0.3, abs=0.01)
-    turns = [(0, 180), (0, 180), (0, 180), (180, 0), (0, 180)]
-    cells = [(0, -1, 0), (0, -1, -1), (0, 0, -1), (0, 0, -2), (0, -1, -2)]
-    for n, ((first, second), cell) in enumerate(zip(turns, cells, strict=True)):
-        bodies[n].joints[f"link {n}"].connect_to(links[n].joints["parent"], angle=first)
-        links[n].joints["child"].connect_to(bodies[n + 1].joints[f"link {n}"], angle=second)
+    example = load("13_folding_chain_build123d")
+    cubes, links = example.main()
+    assert sound(*cubes, *links)
+    assert least_gap(*cubes, *links) == pytest.approx(0.3, abs=0.01)
+    example.fold(cubes, links)
+    assert least_gap(*cubes, *links) == pytest.approx(0.3, abs=0.01)
+    cells = [(0, 0, 0), (0, -1, 0), (0, -1, -1), (0, 0, -1), (0, 0, -2), (0, -1, -2)]
+    for cube, cell in zip(cubes, cells, strict=True):
         core = Pos(*(20 * side for side in cell)) * Box(10, 10, 10)
-        assert -gap(bodies[n + 1], core) == pytest.approx(10**3, rel=1e-3)  # where it belongs
-    assert least_gap(*bodies, *links, up_to=0.4) == pytest.approx(0.3, abs=0.01)
+        assert -gap(cube, core) == pytest.approx(10**3, rel=1e-3)  # where it belongs
 
 
 @pytest.mark.slow
@@ -293,22 +251,15 @@ def test_a_double_hinge_through_each_of_its_ranges(first, second, turns):
 
 @pytest.mark.slow
 def test_a_lid_snaps_shut_on_its_arc():
-    step, front = 0.5 * 40.3, 37.65  # from the axis to the middle of the front wall
-    spec = SnapSpec(length=6, thickness=1.0, width=8, arc=front, inwards=True, material="petg")
-    # z of the snap's frame points out of the rim, and its ridge looks along x: towards the axis.
-    tongue = Plane((0, -front, 20), x_dir=(0, 1, 0), z_dir=(0, 0, 1)) * SnapTongue(spec)
-    mortise = Plane((0, front, 20.3), x_dir=(0, -1, 0), z_dir=(0, 0, -1)) * SnapDimple(spec)
-    box = Pos(0, -step) * tray(60, 40, 20, 5) + tongue
-    lid = Pos(0, step) * tray(60, 40, 20, 5) - mortise
-    hinge = SingleHinge(60, knuckles=5, clearance=0.3)
-    place = hinge_location((0, 0, 20.15), along=(1, 0, 0), outwards=(0, 0, 1))
-    box, lid = hinge.fit(box, lid, place)
+    example = load("14_snap_box_build123d")
+    box, lid = example.main()
+    spec = example.SNAP
     assert sound(box, lid)
     assert gaps(box, lid, (0, 90, 165, 180)) == pytest.approx([0.3] * 4, abs=0.01)
     # What an unbent ridge takes of the wall just before it drops into its dimple.
     assert 0.02 < -gaps(box, lid, (178,))[0] < 2.0 * spec.deflection * spec.width
     with pytest.raises(FitError, match="pressed on its way"):
-        SnapTongue(SnapSpec(length=6, catch=0.4, arc=front, inwards=True, material="petg"))
+        SnapTongue(replace(spec, catch=0.4))
 
 
 def test_a_screw_with_a_sunk_nut():
@@ -322,10 +273,11 @@ def test_a_screw_with_a_sunk_nut():
     assert pytest.approx((-20, 20)) == (loose.min.Z, loose.max.Z)  # nothing stands out
     assert gap(child, hinge.hardware) == pytest.approx(0.2, abs=0.01)
     _, nut = hinge.hardware.solids()
-    assert gap(parent, nut, up_to=3) >= 0.0
+    assert gap(parent, nut) >= 0.0
     assert (parent.solid() & nut) is None or (parent.solid() & nut).volume < 1e-6
 
 
+@pytest.mark.slow
 def test_a_door_hinge_prints_lying_without_support():
     leaf = Leaf(20, 2, flat=True, holes=3, hole=3.4, sink=6.5)
     hinge = SingleHinge(60, knuckles=5, clearance=0.3, leaf=leaf)
