@@ -102,7 +102,7 @@ def pin_friction(
     hinges : sequence of int
         Indices of the hinges that get such pins.
     material : str
-        What is printed; its last word decides, or its first, such as ``"PLA"``.
+        What is printed, such as ``"PLA"``; what none of its words tells counts as resin.
     density_g_cm3 : float
         Of the material.
     grip_mm : float
