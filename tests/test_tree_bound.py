@@ -8,9 +8,15 @@ from scipy.optimize import linear_sum_assignment
 from tree_cases import animal, solid_problem, strip
 
 from fabfold.fold.lattice_foldability import LatticeFoldability
-from fabfold.lattice.rotations import parity
+from fabfold.lattice.rotations import ROTATIONS, parity
 from fabfold.lattice.shipped import load_template
-from fabfold.tree.bound import closed_at_most, closed_share, least_surface, visible_faces
+from fabfold.tree.bound import (
+    closed_at_most,
+    closed_share,
+    least_surface,
+    phase_bounds,
+    visible_faces,
+)
 from fabfold.tree.effort import Effort
 from fabfold.tree.leaf_assignment import assign, reassign_leaves
 from fabfold.tree.pose_energy import count_defects, energy_of
@@ -39,20 +45,34 @@ def test_a_box_shows_its_outer_faces():
 
 
 def test_the_bound_is_that_of_the_best_permutation(bar):
+    # Half turns about edges mirror a voxel along each axis along which its cell changed parity.
     cost = bar.tables.cost.reshape(8, 8, 24).astype(float)
-    source, target = parity(bar.source), parity(bar.template.cells)
-    kinds = {}
-    for r, matrix in enumerate(bar.tables.rotations):
-        kinds.setdefault(tuple(np.abs(matrix).argmax(axis=1)), []).append(r)
-    assert sorted(map(len, kinds.values())) == [4] * 6
+    turn_of = {matrix.tobytes(): r for r, matrix in enumerate(ROTATIONS)}
+    orders = np.array(list(itertools.permutations(range(8))))
+    colours = (parity(bar.source) + parity(bar.template.cells)[orders]) % 2
+    orders = orders[colours.min(axis=1) == colours.max(axis=1)]
     best = np.inf
-    for turns in kinds.values():
-        least = cost[:, :, turns].min(axis=2)
-        for order in itertools.permutations(range(8)):
-            colours = (source + target[list(order)]) % 2
-            if colours.min() == colours.max():
-                best = min(best, least[range(8), order].sum())
+    for root in ROTATIONS:
+        for shift in itertools.product((0, 1), repeat=3):
+            moved = (bar.template.cells @ root)[None] - bar.source[:, None] - shift
+            price = np.full((8, 8), np.inf)
+            for v, c in zip(*np.nonzero(moved.sum(axis=2) % 2 == 0), strict=True):
+                turned = root @ np.diag(1 - 2 * (moved[v, c] % 2))
+                price[v, c] = cost[v, c, turn_of[turned.astype(ROTATIONS.dtype).tobytes()]]
+            best = min(best, price[range(8), orders].sum(axis=1).min())
     assert least_surface(bar) == pytest.approx(best)
+
+
+def test_bounds_of_phases_ascend_and_are_had_by_their_poses(bar):
+    bounds = phase_bounds(bar)
+    assert len(bounds) > 1
+    energies = [bound.energy for bound in bounds]
+    assert energies == sorted(energies)
+    assert energies[0] == least_surface(bar)
+    for bound in bounds:
+        assert sorted(bound.pose // 24) == list(range(8))
+        shown = bar.tables.cost[np.arange(8), bound.pose].sum()
+        assert bound.energy == pytest.approx(shown, rel=1e-5)
 
 
 def test_no_tree_closes_the_box_further_than_the_bound(bar, folded):
@@ -112,7 +132,7 @@ def test_a_tree_that_folds_is_gone_on_from(bar, folded):
     counts = Statistics()
     effort = Effort(polish_best=20, kicks=3, kick_patience=2)
     found = solve(bar, 9, LatticeFoldability(), effort, counts, start=start)
-    assert counts.grown == 0
+    assert counts.grown == counts.annealed == 0
     assert found[0].energy["total"] <= start.energy["total"] + 1e-9
     assert {candidate.seed for candidate in found} == {9}
     assert any(np.array_equal(c.path, start.path) for c in found)

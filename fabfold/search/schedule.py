@@ -56,7 +56,14 @@ def _rungs(
 ) -> tuple[Rung, ...]:
     """Rungs from seeds, one a voxelization; seeds and voxelizations; seeds and kicks."""
     first = replace(
-        effort, restarts=12, starts=1, choices=1, settling=0, polish_each=100, polish_best=0
+        effort,
+        restarts=12,
+        starts=1,
+        choices=1,
+        swaps=0,
+        settling=0,
+        polish_each=100,
+        polish_best=0,
     )
     search = replace(effort, polish_best=0)
     return (

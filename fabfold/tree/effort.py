@@ -26,7 +26,9 @@ class Effort:
     starts : int
         Starts made in any case, so that the best of several trees that fold is polished.
     choices : int
-        Sets of poses grown for each start; the one of least energy is taken.
+        Sets of poses made for each start; the one of least energy is taken.
+    swaps : int
+        Swaps, per voxel, of the annealing that makes a set of poses; 0 to grow them instead.
     settling : int
         Steps, per start and voxel, in which energy and hinges that cannot move go down together
         before the planner is asked for the first time.
@@ -68,8 +70,9 @@ class Effort:
     root_poses: int = 100
     restarts: int = 3
     starts: int = 2
-    choices: int = 3
-    settling: int = 25
+    choices: int = 2
+    swaps: int = 30000
+    settling: int = 40
     removals: int = 6000
     closure_tests: int = 8
     planner_runs: int = 1

@@ -30,10 +30,14 @@ class Statistics:
     ----------
     grown : int
         Full sets of poses grown.
+    annealed : int
+        Sets of poses annealed by swaps until hinges could join them.
     starts : int
         Those whose clusters hinges could join, so that phase A began.
     removals : int
         Large-neighbourhood steps.
+    swaps : int
+        Swaps drawn as steps.
     assignments : int
         Sets of leaves that took their best places at once.
     judged : int
@@ -51,8 +55,10 @@ class Statistics:
     """
 
     grown: int = 0
+    annealed: int = 0
     starts: int = 0
     removals: int = 0
+    swaps: int = 0
     assignments: int = 0
     judged: int = 0
     trees: int = 0

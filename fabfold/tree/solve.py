@@ -12,7 +12,7 @@ the Metropolis rule.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -23,10 +23,8 @@ from fabfold.tree.assembly import SpanningTree, fold_tree, hinge_choice
 from fabfold.tree.candidate import Candidate
 from fabfold.tree.effort import Effort
 from fabfold.tree.foldability import Foldability, PlannerEstimate
-from fabfold.tree.initial_poses import grow
-from fabfold.tree.large_neighbourhood import ruin_and_recreate
-from fabfold.tree.leaf_assignment import reassign_leaves
 from fabfold.tree.pose_energy import energy_of
+from fabfold.tree.pose_moves import PIECE, PoseMoves
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.rng import generator
 from fabfold.tree.search_state import (
@@ -37,27 +35,21 @@ from fabfold.tree.search_state import (
     pose_of_tree,
     steps_of_path,
 )
-from fabfold.tree.spanning_trees import loose_pieces
-from fabfold.tree.swept_cells import hinge_tables
 
 __all__ = ["Statistics", "solve"]
 
 
 #: Share of steps of phase A that start from the hinges in trouble.
 _FOCUSED = 0.5
-#: Share of steps that move leaves to their best places, and how many at most. The others take a
-#: part out and put it back.
-_LEAF_STEPS, _MOST_LEAVES, _LEAF_TRIES = 0.35, 12, 20
-#: First and last temperature while poses settle; the first one after a kick.
-_SETTLE_HOT, _SETTLE_COLD, _KICK_HOT = 0.5, 0.12, 0.2
+#: First and last temperature while poses settle: those that were grown, those that were annealed,
+#: and after a kick.
+_GROWN, _ANNEALED, _KICKED = (0.5, 0.12), (0.15, 0.05), (0.2, 0.08)
 #: Energy by which a tree must be better to count as better.
 _GAIN = 1e-6
 #: First and last temperature of phase B: of each tree that folds, and of the best.
 _POLISH_EACH, _POLISH_BEST = (0.1, 0.02), (0.05, 0.005)
 #: Share of steps of phase A that draw other trees for the same poses.
 _SAME_POSES = 0.05
-#: Energy of a piece that no hinge joins, while poses are made joinable and after.
-_PIECE_WHILE_JOINING, _PIECE = 2.0, 10.0
 
 
 class _Search:
@@ -88,59 +80,9 @@ class _Search:
         weight = np.full(len(problem.joints), self.objective.joint)
         weight[problem.tables.last_single + 1 :] *= double / single if single > 0 else 1.0
         weight[0] = 0.0
-        self.phase_a_tables = self.tables = problem.tables._replace(joint_weight=weight)
+        self.phase_a_tables = problem.tables._replace(joint_weight=weight)
+        self.moves = PoseMoves(problem, effort, self.rng, self.generator, statistics, self.stopped)
         self.results: list[SearchState] = []
-
-    # --- moves -----------------------------------------------------------------------------
-
-    def neighbour(
-        self,
-        pose: NDArray[np.int32],
-        threshold: float,
-        tries: int,
-        piece_penalty: float,
-        focus: NDArray[np.int32] = ANYWHERE,
-        heat: float = 0.0,
-    ) -> tuple[NDArray[np.int32], float, int] | None:
-        """Other poses with energy, and penalty for loose pieces, of at most `threshold`.
-
-        At a temperature `heat` above 0, some steps move leaves to their best places.
-
-        Returns
-        -------
-        (pose, energy, loose pieces) or None
-            None where no step led to such poses.
-        """
-        effort = self.effort
-        out = np.empty(len(pose), np.int32)
-        if heat > 0 and self.tables.max_shared == 0 and self.rng.random() < _LEAF_STEPS:
-            used, energy, left = reassign_leaves(
-                self.tables, pose, self.problem.empty_face, hinge_tables(), piece_penalty,
-                threshold, _LEAF_TRIES, _MOST_LEAVES, heat, self.generator, out,
-            )  # fmt: skip
-            self.statistics.assignments += used
-            return None if math.isinf(energy) else (out, energy, left)
-        used, energy, left = ruin_and_recreate(
-            self.tables, pose, self.problem.empty_face, hinge_tables(), piece_penalty, threshold,
-            focus, tries, effort.min_removed, min(effort.max_removed, len(pose)),
-            effort.repair_beam_width, 0.05, 1.0, self.generator, out,
-        )  # fmt: skip
-        self.statistics.removals += used
-        return None if math.isinf(energy) else (out, energy, left)
-
-    def make_joinable(self, pose: NDArray[np.int32]) -> SearchState | None:
-        """Anneal grown poses until hinges that can turn join all the clusters."""
-        choice = hinge_choice(self.problem, pose)
-        left = int(loose_pieces(choice.rows, choice.clusters, 8, self.generator))
-        value, _ = energy_of(self.tables, pose, self.problem.empty_face)
-        value += _PIECE_WHILE_JOINING * left
-        last = self.statistics.removals + self.effort.removals
-        while left > 0 and self.statistics.removals < last and not self.stopped():
-            threshold = value + 0.3 * self.rng.exponential()
-            found = self.neighbour(pose, threshold, 100, _PIECE_WHILE_JOINING)
-            if found is not None:
-                pose, value, left = found
-        return None if left else SearchState(pose, value, None, 0.0)
 
     # --- judging ---------------------------------------------------------------------------
 
@@ -209,35 +151,12 @@ class _Search:
 
     # --- phases ----------------------------------------------------------------------------
 
-    def starts(self) -> Iterator[SearchState]:
-        """Joinable poses to start from: of each `choices` that were grown the best."""
-        effort, statistics = self.effort, self.statistics
-        best: SearchState | None = None
-        tried = 0
-        for pose in grow(
-            self.problem,
-            self.seed,
-            beam_width=effort.beam_width,
-            root_poses=effort.root_poses,
-            stop=self.stopped,
-        ):
-            statistics.grown += 1
-            tried += 1
-            self.tables = self.phase_a_tables
-            start = self.make_joinable(pose)
-            if start is not None:
-                energy, _ = energy_of(self.tables, start.pose, self.problem.empty_face)
-                if best is None or energy < best.energy:
-                    best = replace(start, energy=energy)
-            if best is not None and tried >= effort.choices:
-                yield best
-                best, tried = None, 0
-        if best is not None:
-            yield best
-
-    def settle(self, start: SearchState, steps_each: int, hot: float) -> SearchState | None:
+    def settle(
+        self, start: SearchState, steps_each: int, heats: tuple[float, float]
+    ) -> SearchState | None:
         """Lower energy and stuck hinges together, by the closure test alone."""
         steps = steps_each * len(self.problem)
+        hot, cold = heats
         weight = self.objective.energy
         now = self.judged(start.pose, start.energy, None, math.inf, plan=False)
         if now is None:
@@ -245,11 +164,11 @@ class _Search:
         for step in range(steps):
             if self.stopped():
                 break
-            heat = hot * (_SETTLE_COLD / hot) ** (step / steps)
+            heat = hot * (cold / hot) ** (step / steps)
             value = weight * now.energy + now.penalty + heat * self.rng.exponential()
             stuck = len(now.focus) > 0 and self.rng.random() < _FOCUSED
             focus = now.focus if stuck else ANYWHERE
-            found = self.neighbour(now.pose, value / weight, 20, _PIECE, focus, heat)
+            found = self.moves.neighbour(now.pose, value / weight, 20, PIECE, focus, heat)
             if found is not None:
                 bound = value - weight * found[1]
                 now = self.judged(found[0], found[1], now, bound, plan=False) or now
@@ -275,7 +194,9 @@ class _Search:
                 pose, energy = now.pose, now.energy
             else:
                 focus = now.focus if self.rng.random() < _FOCUSED else ANYWHERE
-                found = self.neighbour(now.pose, value / objective.energy, 20, _PIECE, focus, heat)
+                found = self.moves.neighbour(
+                    now.pose, value / objective.energy, 20, PIECE, focus, heat
+                )
                 if found is None:
                     tests += 1
                     continue
@@ -297,7 +218,7 @@ class _Search:
                 break
             heat = hot * (cold / hot) ** (step / steps)
             value = now.energy + heat * self.rng.exponential()
-            found = self.neighbour(now.pose, value, 20, _PIECE, heat=heat)
+            found = self.moves.neighbour(now.pose, value, 20, PIECE, heat=heat)
             if found is None:
                 continue
             fresh = self.judged(found[0], found[1], now, 0.0)
@@ -327,15 +248,17 @@ class _Search:
             return None
         return Candidate(fold_tree(self.problem, state.pose, state.tree), path, self.seed)
 
-    def settled_and_folded(self, start: SearchState, steps: int, hot: float) -> SearchState | None:
+    def settled_and_folded(
+        self, start: SearchState, steps: int, heats: tuple[float, float]
+    ) -> SearchState | None:
         """A tree that folds, settled from a start and polished for a moment; None for none."""
-        self.tables = self.phase_a_tables
-        settled = self.settle(start, steps, hot) if steps else start
+        self.moves.tables = self.phase_a_tables
+        settled = self.settle(start, steps, heats) if steps else start
         folded = None if settled is None else self.fold(settled)
-        self.tables = self.problem.tables
+        self.moves.tables = self.problem.tables
         if folded is None:
             return None
-        energy, _ = energy_of(self.tables, folded.pose, self.problem.empty_face)
+        energy, _ = energy_of(self.moves.tables, folded.pose, self.problem.empty_face)
         folded = replace(folded, energy=energy)
         self.keep(folded)
         return self.polish(folded, self.effort.polish_each, *_POLISH_EACH)
@@ -351,7 +274,7 @@ class _Search:
         for _ in range(effort.kicks):
             if idle >= effort.kick_patience or self.stopped():
                 break
-            found = self.settled_and_folded(now, effort.kick_steps, _KICK_HOT)
+            found = self.settled_and_folded(now, effort.kick_steps, _KICKED)
             idle += 1
             if found is not None and found.energy < now.energy - _GAIN:
                 now, idle = found, 0
@@ -360,9 +283,12 @@ class _Search:
         """Trees that fold, from several starts, each polished for a moment."""
         effort, statistics = self.effort, self.statistics
         found: list[SearchState] = []
-        for start in self.starts():
+        self.moves.tables = self.phase_a_tables
+        for start, annealed in self.moves.starts(self.seed):
             statistics.starts += 1
-            folded = self.settled_and_folded(start, effort.settling, _SETTLE_HOT)
+            heats = _ANNEALED if annealed else _GROWN
+            folded = self.settled_and_folded(start, effort.settling, heats)
+            self.moves.tables = self.phase_a_tables
             if folded is not None:
                 found.append(folded)
             enough = effort.starts if found else effort.restarts
@@ -374,7 +300,7 @@ class _Search:
         """A tree that folds as a state; None where the planner does not fold it again."""
         tree, problem = candidate.tree, self.problem
         pose = pose_of_tree(tree)
-        energy, _ = energy_of(self.tables, pose, problem.empty_face)
+        energy, _ = energy_of(self.moves.tables, pose, problem.empty_face)
         choice = hinge_choice(problem, pose)
         hinged = {(edge.parent, edge.child) for edge in tree.edges if edge.kind != "R"}
         guide = steps_of_path(tree, candidate.path)
@@ -387,7 +313,7 @@ class _Search:
 
     def go_on(self, start: Candidate) -> list[Candidate]:
         """Phase B alone, from a tree that folds; that tree is among the results."""
-        self.tables = self.problem.tables
+        self.moves.tables = self.problem.tables
         state = self.state_of(start)
         if state is not None:
             self.results.append(state)
@@ -400,9 +326,9 @@ class _Search:
         effort = self.effort
         found = self.folding_states()
         if found:
-            self.tables = self.problem.tables
+            self.moves.tables = self.problem.tables
             self.improve(min(found, key=lambda s: s.energy))
-        if self.statistics.grown == 0:
+        if self.statistics.grown + self.statistics.annealed == 0:
             raise NoTreeError(
                 f"no tree found for {len(self.problem)} voxels in template "
                 f"{self.problem.template.name!r} from {effort.root_poses} root poses (seed "

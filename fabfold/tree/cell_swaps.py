@@ -1,0 +1,358 @@
+"""Simulated annealing of poses by swaps: two voxels change places, or one takes an empty cell.
+
+In a phase (:mod:`fabfold.tree.phases`) the cell of a voxel gives its rotation, or leaves a few. So
+a set of poses is a permutation of cells, and changing two places is the least step there is. It
+costs a microsecond, and what no joint joins meanwhile is a penalty and no obstacle.
+"""
+
+# mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabfold.tree.possible_hinges import HINGE_ROW, find_hinges, max_hinge_rows
+from fabfold.tree.rng import random_below, random_float
+from fabfold.tree.spanning_trees import loose_pieces
+from fabfold.tree.swept_cells import HingeTables
+from fabfold.tree.tables import Tables
+
+__all__ = ["anneal_swaps"]
+
+#: Share of swaps that bring a voxel beside a source neighbour, as a joint would.
+_BESIDE_NEIGHBOUR = 0.7
+#: Penalty for each voxel that is not in the largest piece, as a share of that for a piece: so large
+#: pieces are worn down by what lies at their rims.
+_OUTSIDE = 0.1
+
+
+@njit(cache=True)
+def _root(link: NDArray[np.int32], a: int) -> int:
+    while link[a] != a:
+        link[a] = link[link[a]]
+        a = link[a]
+    return a
+
+
+@njit(cache=True)
+def _count(
+    neighbour: NDArray[np.int32],
+    allowed: NDArray[np.bool_],
+    child_pose: NDArray[np.int32],
+    pose: NDArray[np.int32],
+    last_single: int,
+    link: NDArray[np.int32],
+) -> tuple[int, int, int, int]:
+    """Rigid clusters, pieces that single hinges leave and that all joints leave, voxels outside.
+
+    The last are those that are not in the largest piece.
+
+    Arrays of the tables one by one: numba passes a tuple of them at the cost of the whole work.
+    """
+    count = len(pose)
+    clusters = count
+    hinged = np.empty((3 * count, 3), np.int32)
+    found = 0
+    for v in range(count):
+        link[v] = v
+    for u in range(count):
+        for f in range(0, 6, 2):
+            v = neighbour[u, f]
+            if v < 0:
+                continue
+            if allowed[u, f, 0] and child_pose[f, 0, pose[u]] == pose[v]:
+                a, b = _root(link, u), _root(link, v)
+                if a != b:
+                    link[a] = b
+                    clusters -= 1
+                continue
+            for j in range(1, allowed.shape[2]):
+                if allowed[u, f, j] and child_pose[f, j, pose[u]] == pose[v]:
+                    hinged[found, 0] = u
+                    hinged[found, 1] = v
+                    hinged[found, 2] = j > last_single
+                    found += 1
+                    break
+    singles = pieces = clusters
+    for double in range(2):
+        for i in range(found):
+            if hinged[i, 2] == double:
+                a, b = _root(link, hinged[i, 0]), _root(link, hinged[i, 1])
+                if a != b:
+                    link[a] = b
+                    pieces -= 1
+        if double == 0:
+            singles = pieces
+    if pieces == 1:
+        return clusters, singles, pieces, 0
+    size = np.zeros(count, np.int32)
+    for v in range(count):
+        size[_root(link, v)] += 1
+    return clusters, singles, pieces, count - size.max()
+
+
+@njit(cache=True)
+def _propose(
+    neighbour: NDArray[np.int32],
+    allowed: NDArray[np.bool_],
+    child_pose: NDArray[np.int32],
+    pose: NDArray[np.int32],
+    occupant: NDArray[np.int32],
+    turns: NDArray[np.int8],
+    v: int,
+    generator: NDArray[np.uint64],
+) -> tuple[int, int, int]:
+    """Another pose for voxel v, who sits there (-1 for nobody), and the pose that one would get.
+
+    The first is -1 where the draw came to nothing.
+    """
+    most = turns.shape[2]
+    here = pose[v] // 24
+    q = -1
+    if random_float(generator) < _BESIDE_NEIGHBOUR:
+        f = random_below(generator, 6)
+        u = neighbour[v, f]
+        if u < 0:
+            return -1, -1, -1
+        j = random_below(generator, child_pose.shape[1])
+        if allowed[u, f ^ 1, j]:
+            q = child_pose[f ^ 1, j, pose[u]]
+    else:
+        c = random_below(generator, len(occupant))
+        r = turns[v, c, random_below(generator, most) if most > 1 else 0]
+        if r >= 0:
+            q = 24 * c + r
+    if q < 0 or q == pose[v]:
+        return -1, -1, -1
+    w = occupant[q // 24]
+    if w < 0 or w == v:
+        return q, -1, -1
+    r = turns[w, here, random_below(generator, most) if most > 1 else 0]
+    if r < 0:
+        return -1, -1, -1
+    return q, w, 24 * here + r
+
+
+@njit(cache=True)
+def _is_alone(
+    neighbour: NDArray[np.int32],
+    allowed: NDArray[np.bool_],
+    child_pose: NDArray[np.int32],
+    pose: NDArray[np.int32],
+    v: int,
+) -> bool:
+    """Whether no joint type could join voxel v to a source neighbour."""
+    for f in range(6):
+        u = neighbour[v, f]
+        if u < 0:
+            continue
+        for j in range(child_pose.shape[1]):
+            if allowed[v, f, j] and child_pose[f, j, pose[v]] == pose[u]:
+                return False
+    return True
+
+
+@njit(cache=True)
+def _torn_pairs(tables: Tables, pose: NDArray[np.int32]) -> int:
+    """Number of faces across which voxels that must stay rigid are not."""
+    torn = 0
+    for v in range(len(tables.always_rigid)):
+        for f in range(0, 6, 2):
+            if tables.always_rigid[v, f]:
+                u = tables.neighbour[v, f]
+                torn += tables.child_pose[f, 0, pose[v]] != pose[u]
+    return torn
+
+
+@njit(cache=True)
+def _loose(
+    tables: Tables,
+    pose: NDArray[np.int32],
+    hinges: HingeTables,
+    hinge_rows: NDArray[np.void],
+    label: NDArray[np.int32],
+    generator: NDArray[np.uint64],
+) -> int:
+    """Pieces, less one, that hinges that can turn leave."""
+    clusters, rows = find_hinges(tables, pose, hinges, label, hinge_rows)
+    return loose_pieces(hinge_rows[:rows], clusters, 4, generator)
+
+
+@njit(cache=True)
+def _surface_energy(tables: Tables, pose: NDArray[np.int32], empty_face: float) -> float:
+    """Weighted energy of the surface, and of whatever else ``Tables.cost`` holds."""
+    total = 0.0
+    occupant = _occupants(pose, len(tables.cells))
+    for cell in range(len(occupant)):
+        v = occupant[cell]
+        if v >= 0:
+            total += np.float64(tables.cost[v, pose[v]])
+            continue
+        for f in range(6):
+            if tables.cell_neighbour[cell, f] < 0:
+                total += empty_face
+    return total
+
+
+@njit(cache=True)
+def _occupants(pose: NDArray[np.int32], cells: int) -> NDArray[np.int32]:
+    """The voxel in each cell, -1 for none."""
+    occupant = np.full(cells, -1, np.int32)
+    for v in range(len(pose)):
+        occupant[pose[v] // 24] = v
+    return occupant
+
+
+@njit(cache=True)
+def anneal_swaps(  # noqa: PLR0912, PLR0915 - one loop, kept whole for speed
+    tables: Tables,
+    pose: NDArray[np.int32],
+    turns: NDArray[np.int8],
+    empty_face: float,
+    hinges: HingeTables,
+    piece_penalty: float,
+    threshold: float,
+    focus: NDArray[np.int32],
+    steps: int,
+    hot: float,
+    cold: float,
+    turning_from: float,
+    generator: NDArray[np.uint64],
+    out: NDArray[np.int32],
+) -> tuple[int, float, int]:
+    """Swap voxels: by simulated annealing, or until the energy is at most a threshold.
+
+    Parameters
+    ----------
+    tables : Tables
+        Tables of a problem in which no two voxels share a cell.
+    pose : (n,) int32 array
+        Full set of poses to start from.
+    turns : (n, m, k) int8 array
+        Rotations of each voxel in each cell, one of :func:`fabfold.tree.phases.phase_rotations`.
+    empty_face : float
+        Weighted energy of one boundary face of an empty template cell.
+    hinges : HingeTables
+        From :func:`fabfold.tree.swept_cells.hinge_tables`.
+    piece_penalty : float
+        Energy added for each piece, after the first, that hinges leave.
+    threshold : float
+        Greatest energy, with the penalty, of a result: the first swap that leads there is the
+        answer. Infinite to anneal.
+    focus : (k,) int32 array
+        Voxels to swap; empty for all.
+    steps : int
+        Swaps drawn.
+    hot, cold : float
+        First and last temperature of an annealing.
+    turning_from : float
+        Share of an annealing after which only hinges that can turn count as joints.
+    generator : (1,) uint64 array
+        Random state, advanced.
+    out : (n,) int32 array
+        Filled with the new poses.
+
+    Returns
+    -------
+    used : int
+        Swaps drawn.
+    energy : float
+        Of `out`, with the penalty; infinite when nothing was found.
+    left : int
+        Pieces of `out`, less one, that hinges that can turn leave.
+    """
+    neighbour, allowed, child_pose = tables.neighbour, tables.allowed, tables.child_pose
+    cost, cell_neighbour = tables.cost, tables.cell_neighbour
+    count = len(pose)
+    label = np.empty(count, np.int32)
+    link = np.empty(count, np.int32)
+    hinge_rows = np.empty(max_hinge_rows(tables), HINGE_ROW)
+    now = pose.copy()
+    occupant = _occupants(now, len(tables.cells))
+    surface = _surface_energy(tables, now, empty_face)
+    last_single = tables.last_single
+    weight = tables.joint_weight[1]
+    more = 0.0
+    if last_single + 1 < len(tables.joint_weight):
+        more = tables.joint_weight[last_single + 1] - weight
+    annealing = threshold == np.inf
+    rigid_pairs = len(tables.always_rigid) > 0
+    turning = not annealing
+    clusters, singles, pieces, outside = _count(
+        neighbour, allowed, child_pose, now, last_single, link
+    )
+    joints = weight * (clusters - 1) + more * (singles - 1)
+    left = pieces - 1 + (_torn_pairs(tables, now) if rigid_pairs else 0)
+    best, best_left = np.inf, count
+    limit = threshold
+    for step in range(steps):
+        if annealing:
+            done = step / steps
+            if not turning and done >= turning_from:
+                turning = True
+                if left == 0:
+                    left = _loose(tables, now, hinges, hinge_rows, label, generator)
+                best_left, best = left, surface + joints + (piece_penalty + count) * left
+                out[:] = now
+            heat = hot * (cold / hot) ** done
+            limit = surface + joints + piece_penalty * (left + _OUTSIDE * outside)
+            limit -= heat * np.log(1.0 - random_float(generator))
+        v = random_below(generator, count)
+        if len(focus) > 0:
+            v = focus[random_below(generator, len(focus))]
+        q, w, p = _propose(neighbour, allowed, child_pose, now, occupant, turns, v, generator)
+        if q < 0:
+            continue
+        before, other = now[v], now[w] if w >= 0 else -1
+        fresh = surface + np.float64(cost[v, q]) - np.float64(cost[v, before])
+        if w >= 0:
+            fresh += np.float64(cost[w, p]) - np.float64(cost[w, other])
+        else:
+            for f in range(6):
+                if cell_neighbour[before // 24, f] < 0:
+                    fresh += empty_face
+                if cell_neighbour[q // 24, f] < 0:
+                    fresh -= empty_face
+        if fresh > limit:
+            continue
+        now[v] = q
+        if w >= 0:
+            now[w] = p
+        taken = False
+        fresh_outside = 0
+        alone = _is_alone(neighbour, allowed, child_pose, now, v) or (
+            w >= 0 and _is_alone(neighbour, allowed, child_pose, now, w)
+        )
+        if not alone or fresh + piece_penalty <= limit:
+            clusters, singles, pieces, fresh_outside = _count(
+                neighbour, allowed, child_pose, now, last_single, link
+            )
+            fresh_joints = weight * (clusters - 1) + more * (singles - 1)
+            fresh_left = pieces - 1
+            extra = piece_penalty * _OUTSIDE * fresh_outside if annealing else 0.0
+            if fresh + fresh_joints + piece_penalty * fresh_left + extra <= limit:
+                if rigid_pairs:
+                    fresh_left += _torn_pairs(tables, now)
+                if turning and fresh_left == 0:
+                    fresh_left = _loose(tables, now, hinges, hinge_rows, label, generator)
+                taken = fresh + fresh_joints + piece_penalty * fresh_left + extra <= limit
+        if not taken:
+            now[v] = before
+            if w >= 0:
+                now[w] = other
+            continue
+        surface, joints, left, outside = fresh, fresh_joints, fresh_left, fresh_outside
+        occupant[before // 24] = w
+        occupant[q // 24] = v
+        value = surface + joints + piece_penalty * left
+        if not annealing:
+            out[:] = now
+            return step + 1, value, left
+        # What does not hang together is worth less than anything that does.
+        value += count * left
+        if turning and value < best:
+            best, best_left = value, left
+            out[:] = now
+    return steps, best - count * best_left if annealing else np.inf, best_left
