@@ -222,16 +222,17 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
     halves = []
     for owner, side in ((0, -1.0), (1, 1.0)):
         overlapped = spec.chamfer or (bumps and not owner)
+        carve = (groove(layout, owner, core), *access)
         halves.append(
             HalfPlan(
-                (groove(layout, owner, core), *access),
+                carve,
                 (*spec.leaf.web(layout, spec.gap, side), *(lugs if owner else ())),
                 (*(shape for who, shape in barrels if who == owner), *(() if owner else bumps)),
                 (
                     *spec.leaf.hole_cuts(layout, spec.gap, side),
                     *(dimples if owner else ()),
                 ),
-                () if overlapped else (groove(layout, owner, spec.radius), *access),
+                () if overlapped else (groove(layout, owner, spec.radius), *carve[1:]),
             )
         )
     return SinglePlan(
