@@ -93,7 +93,7 @@ def test_bores_for_pins_are_half_their_numbers_wider_in_radius(tmp_path):
     ("turns", "more", "words"),
     [
         (0.3, {"pin_grip_mm": 0.3, "pin_slip_mm": 0.3}, "--pin-grip 0.3 must be below --pin-slip"),
-        (0.3, {"pin_grip_mm": 0.45}, "below --pin-slip 0.4.*give both"),
+        (0.3, {"pin_grip_mm": 0.45}, "below --pin-slip 0.4.*the profile's own"),
         (0.3, {"pin_slip_mm": 0.33}, "--pin-slip 0.33: give the number beside the bore"),
         (0.9, {}, "this coupon has 0.15, 0.2"),
         (0.3, {"fuses_mm": 0.12}, "--fuses 0.12"),

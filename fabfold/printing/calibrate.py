@@ -120,9 +120,10 @@ def _bores(
     grip = apart.grip_mm if grip_number is None else round(grip_number / 2.0, 4)
     slip = apart.slip_mm if slip_number is None else round(slip_number / 2.0, 4)
     if grip >= slip:
+        kept = "" if None not in (grip_number, slip_number) else "; the other is the profile's own"
         raise RecipeError(
             f"--pin-grip {2.0 * grip:g} must be below --pin-slip {2.0 * slip:g}: a pin cannot turn "
-            "by itself in a bore that grips it (what is left out is the profile's own: give both)"
+            f"by itself in a bore that grips it{kept}"
         )
     return grip, slip
 
