@@ -23,7 +23,7 @@ from .coupon_plan import (
     require_bed,
 )
 from .exceptions import HingeError
-from .mesh import MeshPart
+from .shape_meshes import MeshPart
 
 __all__ = ["write_coupon"]
 

@@ -18,9 +18,9 @@ from .clearance import Clearance
 from .digits import raised_number
 from .exceptions import FitError, HingeError
 from .leaf import Leaf
-from .mesh import MeshPart, half_manifolds, manifold_of, mesh_part
 from .plan_double import Matrix
 from .plan_single import SinglePlan, SingleSpec, plan_single
+from .shape_meshes import MeshPart, half_manifolds, manifold_of, mesh_part
 from .shapes import HalfPlan, Moved, Prism, Shape, Turned, box, regular
 
 __all__ = [

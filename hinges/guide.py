@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .hidden_lines import visible_edges
-from .mesh import MeshPart
+from .shape_meshes import MeshPart
 
 if TYPE_CHECKING:
     from fpdf import FPDF

@@ -14,7 +14,7 @@ from math import cos, radians
 import numpy as np
 from numpy.typing import NDArray
 
-from .mesh import MeshPart
+from .shape_meshes import MeshPart
 
 __all__ = ["visible_edges"]
 

@@ -16,7 +16,7 @@ from build123d import Align, BasePartObject, Color, Mode, Part, Plane, Solid
 from .coupon_plan import DEFAULT_CLEARANCES, PIN_MM, CouponBody, coupon_meshes, plan_coupon
 from .exact_solids import build_half, build_shape, laid, one_part, solids_of
 from .exceptions import HingeError
-from .mesh import MeshPart
+from .shape_meshes import MeshPart
 from .shapes import HalfPlan
 
 if TYPE_CHECKING:

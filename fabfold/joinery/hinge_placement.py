@@ -17,7 +17,7 @@ from fabfold.tree.fold_tree import Edge, FoldTree, Hinge
 if TYPE_CHECKING:
     import manifold3d
 
-    from hinges.mesh import MeshPart
+    from hinges.shape_meshes import MeshPart
 
 __all__ = [
     "LinkPlate",

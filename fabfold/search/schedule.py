@@ -52,9 +52,12 @@ class Rung:
 
 
 def _rungs(
-    effort: Effort, closing: int, promising: tuple[int, int], best: tuple[tuple[int, int], ...]
+    effort: Effort,
+    closing: tuple[int, int],
+    promising: tuple[int, int],
+    best: tuple[tuple[int, int], ...],
 ) -> tuple[Rung, ...]:
-    """Rungs from seeds, one a voxelization; seeds and voxelizations; seeds and kicks."""
+    """Rungs from seeds and voxelizations, twice, and from seeds and kicks."""
     first = replace(
         effort,
         restarts=12,
@@ -68,16 +71,16 @@ def _rungs(
     search = replace(effort, polish_best=0)
     return (
         Rung("roomy", 1, first),
-        Rung("closing", closing, search, closing),
+        Rung("closing", closing[0], search, closing[1]),
         Rung("promising", promising[0], search, promising[1]),
         *(Rung("best", seeds, replace(effort, kicks=kicks)) for seeds, kicks in best),
     )
 
 
 _SCHEDULES: dict[str, tuple[Rung, ...]] = {
-    "quick": _rungs(EFFORTS["quick"], 3, (1, 1), ((1, 4),)),
-    "normal": _rungs(EFFORTS["normal"], 4, (4, 2), ((3, 6), (2, 8))),
-    "thorough": _rungs(EFFORTS["thorough"], 8, (16, 3), ((6, 20), (4, 40), (4, 40), (4, 40))),
+    "quick": _rungs(EFFORTS["quick"], (3, 3), (1, 1), ((1, 4),)),
+    "normal": _rungs(EFFORTS["normal"], (6, 3), (6, 2), ((2, 4), (2, 4))),
+    "thorough": _rungs(EFFORTS["thorough"], (12, 6), (24, 3), ((6, 20), (4, 40), (4, 40), (4, 40))),
 }
 
 

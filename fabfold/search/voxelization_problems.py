@@ -193,7 +193,8 @@ class VoxelizationProblems:
         -------
         list of int
             Those that were not tried count as if they came as near to their bound as the best of
-            the others; those on which nothing folded come last.
+            the others. Those on which nothing folded come last, and with them what was not tried
+            and is of their size: room decides.
         """
         floor = {
             option: (1.0 - self.at_most(option)) * visible_faces(self.template)
@@ -202,8 +203,17 @@ class VoxelizationProblems:
         weight = weights_of(self.recipe).surface
         gaps = [found[option] - weight * floor[option] for option in found]
         gap = min(gaps, default=0.0)
-        order = self.closing_order()
-        return sorted(order, key=lambda k: found.get(k, weight * floor[k] + gap))
+        size = [len(voxels) for voxels in self.options]
+
+        def expected(option: int) -> float:
+            if option in found:
+                return found[option]
+            alike = [found[k] for k in found if abs(size[k] - size[option]) <= _ALIKE]
+            if alike and min(alike) == float("inf"):
+                return float("inf")
+            return weight * floor[option] + gap
+
+        return sorted(self.closing_order(), key=expected)
 
     def at_most(self, option: int) -> float:
         """Share to which the box could be closed with a voxelization; 0 where no tree fits."""

@@ -79,7 +79,7 @@ class Effort:
     polish_each: int = 300
     polish_best: int = 600
     kicks: int = 0
-    kick_steps: int = 8
+    kick_steps: int = 16
     kick_patience: int = 4
     min_removed: int = 4
     max_removed: int = 16

@@ -43,7 +43,7 @@ __all__ = ["Statistics", "solve"]
 _FOCUSED = 0.5
 #: First and last temperature while poses settle: those that were grown, those that were annealed,
 #: and after a kick.
-_GROWN, _ANNEALED, _KICKED = (0.5, 0.12), (0.15, 0.05), (0.2, 0.08)
+_GROWN, _ANNEALED, _KICKED = (0.5, 0.12), (0.15, 0.05), (0.12, 0.05)
 #: Energy by which a tree must be better to count as better.
 _GAIN = 1e-6
 #: First and last temperature of phase B: of each tree that folds, and of the best.

@@ -9,9 +9,9 @@ import manifold3d as m3
 import numpy as np
 
 from hinges.exact_solids import build_half
-from hinges.mesh import half_manifolds
 from hinges.plan_double import DoublePlan, child_pose, link_pose
 from hinges.plan_single import SinglePlan
+from hinges.shape_meshes import half_manifolds
 from hinges.shapes import HalfPlan
 
 SEGMENTS = 64

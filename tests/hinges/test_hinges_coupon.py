@@ -18,7 +18,7 @@ from hinges.coupon_plan import (
     relieved,
 )
 from hinges.digits import raised_number
-from hinges.mesh import manifold_of
+from hinges.shape_meshes import manifold_of
 
 FEW = (0.2, 0.35)
 

@@ -7,7 +7,7 @@ from manifold3d import Manifold
 from hinges import write_coupon
 from hinges.guide import write_guide
 from hinges.hidden_lines import visible_edges
-from hinges.mesh import mesh_part
+from hinges.shape_meshes import mesh_part
 
 
 def box(*size):

@@ -5,8 +5,8 @@ import pytest
 
 from hinges import DoubleHinge, FilamentPin, HingeError, SingleHinge, StraightPin
 from hinges.joint_play import Play, contacts, largest_tilt, play, total_play
-from hinges.mesh import half_manifolds
 from hinges.plan_single import SingleSpec, plan_single
+from hinges.shape_meshes import half_manifolds
 
 ANGLE = 60.0
 
