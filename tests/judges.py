@@ -39,11 +39,16 @@ class Recording(LatticeFoldability):
         return super().path(system, guide)
 
 
-def first_question(problem, seed, effort):
-    """What tells a seed's run from another: the first system whose path it wants."""
-    judge = Recording()
-    run_seed(Job(problem, judge, effort), seed, lambda _candidate: None, lambda: False)
-    return judge.asked[0]
+def own_question(problem, seed, others, effort):
+    """What tells a seed's run from others: the first system whose path it alone wants."""
+
+    def questions(asking):
+        judge = Recording()
+        run_seed(Job(problem, judge, effort), asking, lambda _candidate: None, lambda: False)
+        return judge.asked
+
+    common = {mark for other in others for mark in questions(other)}
+    return next(mark for mark in questions(seed) if mark not in common)
 
 
 class Poisoned(LatticeFoldability):

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from judges import Announcing, Poisoned, Results, first_question
+from judges import Announcing, Poisoned, Results, own_question
 from tree_cases import solid_problem, strip
 
 from fabfold.errors import RecipeError, WorkerError
@@ -112,7 +112,7 @@ def dask(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def problem():
-    return solid_problem(strip(8), "box-2x2x2")
+    return solid_problem(strip(12), "box-2x2x3")
 
 
 @pytest.fixture(scope="module")
@@ -143,7 +143,7 @@ def test_the_answer_is_that_of_this_machine(problem, alone, dask):
 @pytest.mark.slow
 def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alone, dask):
     heard = Results()
-    judge = Poisoned(first_question(problem, 1, EFFORT))
+    judge = Poisoned(own_question(problem, 1, (0, 2, 3), EFFORT))
     found = search(
         problem, range(4), judge, EFFORT, scheduler=dask.address, on_event=heard.on_event
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from judges import Deadly, Deaf, Poisoned, Results, first_question
+from judges import Deadly, Deaf, Poisoned, Results, own_question
 from tree_cases import solid_problem, strip
 
 from fabfold.errors import NoTreeError, RecipeError, WorkerError
@@ -24,7 +24,7 @@ EFFORT = replace(EFFORTS["quick"], restarts=2, polish_best=20)
 
 @pytest.fixture(scope="module")
 def problem():
-    return solid_problem(strip(8), "box-2x2x2")
+    return solid_problem(strip(12), "box-2x2x3")
 
 
 def key(candidates):
@@ -78,7 +78,7 @@ def test_a_killed_worker_costs_nothing(problem, alone, tmp_path):
 @pytest.mark.slow
 def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alone):
     heard = Results()
-    judge = Poisoned(first_question(problem, 2, EFFORT))
+    judge = Poisoned(own_question(problem, 2, (0, 1, 3), EFFORT))
     found = search(problem, range(4), judge, EFFORT, workers=2, on_event=heard.on_event)
     assert key(found) == key([c for c in alone if c.seed != 2])
     assert heard.done[2].failed
@@ -90,7 +90,7 @@ def test_a_seed_that_always_kills_is_left_out_and_the_others_return(problem, alo
 def test_a_seed_that_raises_is_left_out_and_the_others_return(problem, alone):
     for workers in (1, 2):
         heard = Results()
-        judge = Poisoned(first_question(problem, 1, EFFORT), exits=False)
+        judge = Poisoned(own_question(problem, 1, (0, 2), EFFORT), exits=False)
         found = search(problem, range(3), judge, EFFORT, workers=workers, on_event=heard.on_event)
         assert key(found) == key([c for c in alone if c.seed in (0, 2)])
         assert heard.done[1].failed
@@ -98,7 +98,7 @@ def test_a_seed_that_raises_is_left_out_and_the_others_return(problem, alone):
 
 
 def test_where_every_seed_fails_it_is_said_and_not_taken_for_no_fold(problem):
-    judge = Poisoned(first_question(problem, 7, EFFORT), exits=False)
+    judge = Poisoned(own_question(problem, 7, (), EFFORT), exits=False)
     with pytest.raises(WorkerError, match="every seed failed"):
         search(problem, [7], judge, EFFORT, workers=1)
 
