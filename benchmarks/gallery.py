@@ -30,9 +30,9 @@ from fabfold.solid.convert import to_mesh
 ROOT = Path(__file__).resolve().parents[1]
 GALLERY = ROOT / "prints" / "gallery"
 
-#: Every kit with its model and what is asked for besides.
+#: Every kit with its model and what is asked for besides; searched quickly but for the first.
 KITS: Final[dict[str, dict[str, str]]] = {
-    "car": {"model": "sample:car", "profile": "mjf-pa12", "pose": "b"},
+    "car": {"model": "sample:car", "profile": "mjf-pa12", "pose": "b", "effort": "normal"},
     "duck": {"model": "sample:duck", "profile": "mjf-pa12"},
     "elephant": {"model": "sample:elephant", "profile": "sls-pa12", "pose": "b"},
     "locomotive": {"model": "sample:locomotive", "profile": "fdm-pla-0.4"},
@@ -129,7 +129,7 @@ def main() -> None:
     ]
     for name, asked in KITS.items():
         options = {key: value for key, value in asked.items() if key != "model"}
-        kit = open_kit(asked["model"], folder=kits / name, effort="quick", **options)
+        kit = open_kit(asked["model"], folder=kits / name, **{"effort": "quick", **options})
         folder = kit.export()
         place = GALLERY / name
         place.mkdir(parents=True, exist_ok=True)
