@@ -125,7 +125,8 @@ def main() -> None:
         "Every built-in sample as the model (A), half-way, and folded (B), and as it is printed:",
         "three kits in place, three body by body. `python benchmarks/gallery.py` makes all of it",
         "again. Recipe, picture and figures of each are in `prints/gallery/`:",
-        "`fabfold export prints/gallery/car/kit.toml -o car-kit` makes the same kit.",
+        "`fabfold export prints/gallery/car/kit.toml -o car-kit` makes the same kit. All but the",
+        "car are searched with `--effort quick`.",
     ]
     for name, asked in KITS.items():
         options = {key: value for key, value in asked.items() if key != "model"}
