@@ -157,12 +157,24 @@ def test_hinge_examples_write_step(name, tmp_path):
     assert path.suffix == ".step"
 
 
-def test_the_gallery_has_a_recipe_and_a_picture_of_every_sample():
-    recipes = {path.stem: read_recipe(path) for path in (ROOT / "prints" / "gallery").iterdir()}
-    assert sorted(recipes) == sample_names()
+def test_the_gallery_has_recipe_pictures_and_figures_of_six_kits():
+    places = sorted((ROOT / "prints" / "gallery").iterdir())
+    recipes = {place.name: read_recipe(place / "kit.toml") for place in places}
+    assert len(recipes) == 6
+    assert {recipe.model for recipe in recipes.values()} == {f"sample:{s}" for s in sample_names()}
     page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
-    for name, recipe in recipes.items():
-        assert recipe.model == f"sample:{name}"
-        assert f"folds into {recipe.template} in" in page.split(f"## {name}\n")[1].split("##")[0]
-        assert f"(pictures/{name}.png)" in page
-        assert (ROOT / "docs" / "pictures" / f"{name}.png").is_file()
+    ways = set()
+    for place, recipe in zip(places, recipes.values(), strict=True):
+        told = json.loads((place / "figures.json").read_text(encoding="utf-8"))
+        part = page.split(f"## {place.name}\n")[1].split("##")[0]
+        assert f"folds into {recipe.template} in {told['moves']} moves" in part
+        assert f"(../prints/gallery/{place.name}/plates.png)" in part
+        assert f"`{recipe.profile}`" in part
+        assert told["checks_passed"][0] == told["checks_passed"][1]
+        assert (place / "plates.png").stat().st_size < 300_000
+        assert {path.name for path in place.iterdir()} == {"kit.toml", "plates.png", "figures.json"}
+        ways.add(told["print"])
+        if recipe.model == f"sample:{place.name}":
+            assert f"(pictures/{place.name}.png)" in part
+            assert (ROOT / "docs" / "pictures" / f"{place.name}.png").is_file()
+    assert ways == {"in-place", "apart"}
