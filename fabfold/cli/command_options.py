@@ -17,6 +17,7 @@ __all__ = [
     "DoubleWeight",
     "DropBelow",
     "Effort",
+    "Fill",
     "FitBed",
     "Fuses",
     "Joints",
@@ -208,6 +209,15 @@ Skin = Annotated[
         metavar="model|lattice",
         help="Bodies with the model's surface, or plain blocks of cells with chamfered edges "
         "(lattice): exact in CAD, and small files. Default: model.",
+    ),
+]
+Fill = Annotated[
+    bool | None,
+    typer.Option(
+        "--fill/--no-fill",
+        help="Close open faces of the box from inside, with plates as thick as the printer's wall "
+        "behind faces that another voxel covers in the model. Default: no.",
+        show_default=False,
     ),
 ]
 Seed = Annotated[

@@ -19,6 +19,7 @@ from fabfold.joinery.carving import CarvedMaterial, carve
 from fabfold.joinery.cells import eroded_cells, model_manifold
 from fabfold.joinery.cut_walls import with_cut_walls
 from fabfold.joinery.cutting import BodyCutter
+from fabfold.joinery.face_fill import with_filled_faces
 from fabfold.joinery.hinge_placement import place_hinges
 from fabfold.joinery.links import link_body
 from fabfold.joinery.one_piece import connect_pieces
@@ -29,6 +30,7 @@ from fabfold.joinery.tally import BuildTally
 from fabfold.progress import Progress, SilentProgress
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.sharing import WHOLE
+from fabfold.voxels.features import features
 from fabfold.voxels.voxel_model import Voxels
 
 if TYPE_CHECKING:
@@ -56,6 +58,7 @@ def build_bodies(
     pin: LoosePin | None = None,
     wall_mm: float = 0.0,
     chamfer_mm: float = 0.0,
+    fill_g_cm3: float | None = None,
     progress: Progress | None = None,
 ) -> Joinery:
     """Make the printed bodies of a kit.
@@ -93,6 +96,9 @@ def build_bodies(
         Least thickness of the material behind the faces that the cut makes, mm.
     chamfer_mm : float
         Leg of the chamfer on the edges of the bodies' cells, mm; for bodies that are blocks.
+    fill_g_cm3 : float, optional
+        Density of the material of plates of `wall_mm` that close open faces of the box from inside;
+        without it these stay open.
     progress : Progress, optional
         Is told how far the work is.
 
@@ -125,6 +131,17 @@ def build_bodies(
     walls_mm3 = 0.0
     if wall_mm > 0.0:
         model, walls_mm3 = with_cut_walls(model, tree, voxel_mm, size.gap_mm / 2, wall_mm)
+    filled: tuple[str, ...] = ()
+    if fill_g_cm3 is not None:
+        model, fill = with_filled_faces(
+            model,
+            tree,
+            features(voxels).depth,
+            voxel_mm=voxel_mm,
+            inset_mm=size.gap_mm / 2,
+            wall_mm=wall_mm,
+        )
+        filled = (fill.note(wall_mm, fill_g_cm3),)
     hinges = place_hinges(tree, motion, size, voxel_mm)
     past_barrels = _by_body(tree, barrel_sweeps(tree, motion, 1.05 * size.reach_mm / voxel_mm))
     past_plates = _by_body(
@@ -170,6 +187,7 @@ def build_bodies(
         dropped_mm3=round(tally.dropped_mm3, 3),
         struts=tally.struts,
         notes=(
+            *filled,
             *_wall_notes(walls_mm3, wall_mm),
             *carved.notes(),
             *tally.notes(voxel_mm, len(hinges.plates)),

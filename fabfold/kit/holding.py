@@ -59,6 +59,7 @@ def mode_of(recipe: Recipe) -> PrintMode:
         recipe.clearance_mm,
         hold,
         blocks=recipe.skin == "lattice",
+        fill=recipe.fill,
         pose=recipe.pose,
     )
 

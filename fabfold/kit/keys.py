@@ -71,7 +71,13 @@ def join_key(recipe: Recipe, template: Template, mode: PrintMode, mark: list[Any
         fold_key(recipe, template, mark),
         recipe.voxel_mm,
         mode.profile.model_dump(mode="json"),
-        [mode.name, *([mode.pin] if mode.apart else []), *astuple(mode.hold), mode.blocks],
+        [
+            mode.name,
+            *([mode.pin] if mode.apart else []),
+            *astuple(mode.hold),
+            mode.blocks,
+            mode.fill,
+        ],
         "walls",
     )
 

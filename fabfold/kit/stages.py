@@ -103,6 +103,7 @@ def build(
         pin=mode.loose_pin(),
         wall_mm=profile.min_wall_mm,
         chamfer_mm=CHAMFER_SHARE * voxel_mm if mode.blocks else 0.0,
+        fill_g_cm3=profile.density_g_cm3 if mode.fill else None,
         progress=progress,
     )
     if mode.apart:

@@ -17,7 +17,7 @@ from fabfold.voxels.voxelize import voxelize
 
 __all__ = ["BoxAdvice", "advised_box"]
 
-#: Boxes that are looked at, by their sides in cells: from 27 to 125 cells, as near a cube as can be.
+#: Boxes that are looked at, by their sides in cells: of 27 to 125 cells, and nearly cubes.
 _BOXES = ((3, 3, 3), (3, 3, 4), (3, 4, 4), (3, 4, 5), (4, 4, 4), (4, 4, 5), (4, 5, 5), (5, 5, 5))
 #: Boxes of fewer or more cells than this share of those of the one given are left out.
 _LEAST, _MOST = 0.5, 1.3

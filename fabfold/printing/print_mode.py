@@ -89,6 +89,8 @@ class PrintMode:
         What holds the kit shut.
     blocks : bool
         Whether bodies are blocks of cells, without the model's surface.
+    fill : bool
+        Whether plates close open faces of the box from inside.
     pose : str
         Pose in which it is printed in place, as of :func:`fabfold.printing.print_pose.print_pose`.
     """
@@ -99,6 +101,7 @@ class PrintMode:
     pin: str
     hold: Hold = Hold()
     blocks: bool = False
+    fill: bool = False
     pose: str = "a"
 
     @property
@@ -164,6 +167,7 @@ def print_mode(
     hold: Hold | None = None,
     *,
     blocks: bool = False,
+    fill: bool = False,
     pose: str = "a",
 ) -> PrintMode:
     """Choose how a kit is printed.
@@ -182,6 +186,8 @@ def print_mode(
         What is to hold the kit shut; nothing by default.
     blocks : bool
         Whether bodies are blocks of cells, without the model's surface.
+    fill : bool
+        Whether plates close open faces of the box from inside.
     pose : str
         Pose in which it is printed in place.
 
@@ -223,4 +229,4 @@ def print_mode(
             f"--pose {pose}: magnets are enclosed at heights that are known for the model's pose; "
             "leave --pose out, or take --magnet-fit glued"
         )
-    return PrintMode(apart, why, gapped, pin, hold, blocks, pose)
+    return PrintMode(apart, why, gapped, pin, hold, blocks, fill, pose)

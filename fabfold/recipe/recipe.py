@@ -29,7 +29,7 @@ Vector = tuple[float, float, float]
 #: Words for numbers.
 _PREFER = {"hinges": 0.0, "balanced": 0.5, "surface": 1.0}
 #: Fields that are true or false.
-_SWITCHES = ("joints_inside", "share", "retention_in_a")
+_SWITCHES = ("joints_inside", "share", "retention_in_a", "fill")
 _VOID = {"inside": 1.0, "even": 0.0, "surface": -1.0}
 
 
@@ -83,6 +83,9 @@ class Recipe(BaseModel):
         Literal["model", "lattice"],
         Field(description="the model's surface, or lattice: blocks of cells with chamfered edges"),
     ] = "model"
+    fill: Annotated[bool, Field(description="plates close open faces of the box from inside")] = (
+        False
+    )
     pose: Annotated[
         str,
         Field(
