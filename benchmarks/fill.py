@@ -50,8 +50,9 @@ def main() -> None:
     lines = [
         "# Open faces closed by plates",
         "",
-        "Written by `python benchmarks/fill.py`: samples searched with `--effort quick`, `mjf-pa12`,",
-        "voxels of 20 mm, plates of 0.5 mm. *Gap* is the smallest one proven on the whole path.",
+        "Written by `python benchmarks/fill.py`: samples searched with `--effort quick`, profile",
+        "`mjf-pa12`, voxels of 20 mm, plates of 0.5 mm. *Gap* is the smallest one proven on the",
+        "whole path.",
         "",
         "| sample | faces closed | closed before | after | plates, g | bodies, cm³ | with plates | "
         "gap, mm | with plates | checks with plates |",
