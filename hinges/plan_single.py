@@ -249,7 +249,7 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
     halves = []
     for owner, (side, mount) in enumerate(zip((-1.0, 1.0), spec.mounts, strict=True)):
         room = (*access, *(shape for who, shape in travel if who == owner))
-        overlapped = spec.chamfer or (bumps and not owner)
+        overlapped = spec.chamfer or travel or (bumps and not owner)
         halves.append(
             HalfPlan(
                 (groove(layout, owner, core), *room),

@@ -14,7 +14,8 @@ from fabfold.export.hardware_brep import hardware_solids, turned_brep
 from fabfold.export.step import write_step
 from fabfold.export.steptext import StepSolid, step_text
 from fabfold.joinery.bodies import PlacedPin
-from fabfold.joinery.magnets import MagnetPair, Retention
+from fabfold.joinery.box_hold import Retention
+from fabfold.joinery.magnets import MagnetPair
 
 PAIR = MagnetPair((0, 3), ((20.0, 5.0, 7.0), (80.0, 5.0, 7.0)), ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)))
 
@@ -29,7 +30,7 @@ def assembled(tmp_path_factory):
         PlacedPin(2, 2, (62.5, 3.0, 16.0), (62.5, 3.0, 6.0), 2.0, 1.9, 2.0, 2.5),
     )
     joinery = replace(joinery, pins=pins)
-    hardware = hardware_solids(joinery, tree, Retention("3x1", (PAIR,), (), ()))
+    hardware = hardware_solids(joinery, tree, Retention((), (), "3x1", pairs=(PAIR,)))
     folder = tmp_path_factory.mktemp("assembled")
     path, both = folder / "row.step", folder / "hardware" / "row-assembled.step"
     write_step(path, joinery, tree, hardware=hardware, assembled=both)
