@@ -61,9 +61,18 @@ def picture(page: Any) -> np.ndarray:
 
     from PIL import Image
 
-    page.wait_for_timeout(1500)
-    shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-    return np.asarray(shot)[:, :920].astype(int)
+    def shot() -> np.ndarray:
+        page.wait_for_timeout(1500)
+        image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+        return np.asarray(image)[:, :920].astype(int)
+
+    # A busy machine draws late: the scene is there when it stands still.
+    before, now = shot(), shot()
+    for _ in range(20):
+        if np.array_equal(before, now):
+            break
+        before, now = now, shot()
+    return now
 
 
 def coloured(pixels: np.ndarray) -> int:
