@@ -6,8 +6,12 @@ import manifold3d
 import numpy as np
 import pytest
 
+from fabfold.errors import RecipeError
 from fabfold.joinery.face_fill import FaceFill, covered_faces, with_filled_faces
 from fabfold.lattice.rotations import FACES
+from fabfold.lattice.shipped import load_template
+from fabfold.printing.print_mode import print_mode
+from fabfold.printing.profiles import load_profile
 
 SIDE, INSET, WALL = 20.0, 0.25, 0.8
 
@@ -62,6 +66,16 @@ def test_a_face_with_nothing_behind_it_stays_open(tree):
     _, fill = with_filled_faces(crumb, tree, depth, voxel_mm=SIDE, inset_mm=INSET, wall_mm=WALL)
     assert (fill.faces, fill.added_mm3) == (0, 0.0)
     assert fill.left_open == len(covered_faces(tree))
+
+
+def test_where_it_means_nothing_it_is_refused():
+    profile = load_profile("mjf-pa12")
+    with pytest.raises(RecipeError, match="no open faces"):
+        print_mode(profile, fill=True, blocks=True)
+    mode = print_mode(profile, fill=True)
+    mode.require_template(load_template("box-4x4x4"))
+    with pytest.raises(RecipeError, match="'book-64' folds once more"):
+        mode.require_template(load_template("book-64"))
 
 
 def test_the_note_says_faces_grams_and_shares():

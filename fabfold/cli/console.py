@@ -192,9 +192,9 @@ def _result_lines(kit: Kit, stage: str, checks: Sequence[Check]) -> list[str]:
         more = {"quick": "normal", "normal": "thorough"}.get(kit.recipe.effort)
         hint = f"; --effort {more} looks further" if more and kit.seconds is None else ""
         lines.append(f"{closure}{hint}")
-        advice = advised_box(kit.cut_solid(), kit.recipe, kit.template, closure.at_most)
-        if advice is not None:
-            lines.append(f"another box suits the model better: {advice}")
+        if stage in ("fit", "export"):
+            advice = advised_box(kit.cut_solid(), kit.recipe, kit.template, closure.at_most)
+            lines += [f"another box suits the model better: {advice}"] if advice else []
     lines += [str(entry["text"]) for entry in kit.wish_report(planned, joinery)]
     if motion.certificate:
         lines.append(f"smallest gap on the whole path {motion.certificate['min_gap_mm']:.3f} mm")

@@ -163,7 +163,9 @@ class Kit(StageRunner):
         from fabfold.kit.cutting_stage import cut_model
         from fabfold.kit.stage_files import load_cut, save_cut
 
-        self.print_mode().require_hinge(self.recipe.voxel_mm)
+        mode = self.print_mode()
+        mode.require_hinge(self.recipe.voxel_mm)
+        mode.require_template(self._template)
         solid = self.solid()
         regions = self.wishes().regions
 

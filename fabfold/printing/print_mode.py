@@ -10,6 +10,7 @@ from fabfold.joinery.pin_kinds import PINS, PinFit
 from fabfold.printing.profiles import Profile
 
 if TYPE_CHECKING:
+    from fabfold.lattice.template import Template
     from hinges.hardware import LoosePin
 
 __all__ = ["Hold", "PrintMode", "print_mode"]
@@ -135,6 +136,25 @@ class PrintMode:
         apart = self.profile.apart
         return PINS[self.pin].fit(apart.grip_mm, apart.slip_mm)
 
+    def require_template(self, template: Template) -> None:
+        """Refuse a template whose faces cannot be treated as asked for.
+
+        Parameters
+        ----------
+        template : Template
+            The target shape.
+
+        Raises
+        ------
+        RecipeError
+            If open faces are to be closed, and the template shows others once it is folded again.
+        """
+        if self.fill and template.creases:
+            raise RecipeError(
+                f"--fill: template {template.name!r} folds once more, and shows other faces then; "
+                "leave --fill out, or take a box"
+            )
+
     def require_hinge(self, voxel_mm: float) -> None:
         """Refuse a size of voxels that holds no hinge.
 
@@ -223,6 +243,10 @@ def print_mode(
         raise RecipeError(
             f"--retention friction: a screw rubs as hard as it is driven in, so --pin {pin} needs "
             "no friction pins; take --retention magnet, or a plain pin such as --pin 1.75"
+        )
+    if fill and blocks:
+        raise RecipeError(
+            "--fill: blocks of cells have no open faces; leave --fill or --skin lattice out"
         )
     if hold.enclosed and not apart and pose != "a":
         raise RecipeError(

@@ -96,7 +96,7 @@ class Refinement:
     Parameters
     ----------
     solid : Solid
-        The model.
+        The model as it lies in `axes`.
     axes : (3, 3) float64 array
         Orthogonal axes, one a row, in which it is looked at: model axes, or such that turn with it.
     template : Template
@@ -130,8 +130,8 @@ class Refinement:
         limit: int,
     ) -> None:
         self.axes = axes
-        seen = solid.in_axes(axes)
-        self.vertices, self.faces = seen.vertices, seen.faces
+        self.vertices = np.asarray(solid.vertices, dtype=np.float64)
+        self.faces = np.ascontiguousarray(solid.faces, dtype=np.int32)
         self.volume = solid.volume
         self.extent = float(np.ptp(self.vertices, axis=0).max())
         self.template = template

@@ -196,7 +196,8 @@ class _PitchEstimate:
     def look(self, solid: Solid) -> tuple[float, bool]:
         """Side of a voxel in model units, and whether little of the volume is lost."""
         axes = own_axes(solid.vertices, solid.faces)
-        rotations = grid_rotations(_LOOKS, self.seed, solid.in_axes(axes).vertices)
+        solid = solid.in_axes(axes)
+        rotations = grid_rotations(_LOOKS, self.seed, solid.vertices)
         refinement = Refinement(solid, axes, self.template, rotations, self.energy, 4)
         for loss in _LOSSES:
             found, _ = refinement.pilot(loss)

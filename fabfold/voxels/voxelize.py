@@ -128,7 +128,8 @@ def voxelize(
     else:
         nearby = int(_NEARBY * placements)
         axes = own_axes(solid.vertices, solid.faces)
-        rotations = grid_rotations(placements - nearby, seed, solid.in_axes(axes).vertices)
+        solid = solid.in_axes(axes)
+        rotations = grid_rotations(placements - nearby, seed, solid.vertices)
     refinement = Refinement(
         solid, axes, template, rotations, CellEnergy(drop_below=drop_below), max_offset
     )
