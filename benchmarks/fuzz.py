@@ -1,6 +1,10 @@
-"""Every reader on files that a fuzzer grows: coverage-guided by atheris, for a time.
+"""Every reader on files that a fuzzer grows: coverage-guided by atheris, for a time or a number.
 
-    python benchmarks/fuzz.py [SECONDS] [READER ...]
+    python benchmarks/fuzz.py [SECONDS | --same] [READER ...]
+
+With ``--same`` each reader gets a fixed number of files, the same ones in every run on a system
+that can start a process at the same addresses: what has passed passes again. With seconds, files
+are as many as there is time for.
 
 A reader may raise an error of ours, with a sentence of one line, or read the file. Anything else is
 a finding: another exception, 10 s without an answer, over 2 GB of memory, the end of the process.
@@ -21,6 +25,7 @@ import sys
 import tempfile
 import traceback
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -28,8 +33,8 @@ FINDINGS = Path("fuzz-findings")
 sys.path[:0] = [str(HERE.parent / "tests"), str(HERE.parent)]
 
 
-def fuzz_one(name: str, seconds: int, corpus: Path) -> None:
-    """Fuzz one reader in this process, which libFuzzer ends."""
+def fuzz_one(name: str, limit: str, corpus: Path) -> None:
+    """Fuzz one reader in this process, which libFuzzer ends at an option of its own, `limit`."""
     import logging
     import warnings
 
@@ -47,7 +52,11 @@ def fuzz_one(name: str, seconds: int, corpus: Path) -> None:
     warnings.simplefilter("ignore")
     reader = READERS[name]
     folder = Path(tempfile.mkdtemp(dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
-    path = folder / reader.file
+    FINDINGS.mkdir(exist_ok=True)
+    findings = FINDINGS.resolve()
+    # The name of the folder is another one in each run, and the fuzzer learns from what it reads.
+    os.chdir(folder)
+    path = Path(reader.file)
     path.parent.mkdir(exist_ok=True)
     for number, seed in enumerate(reader.seeds):
         (corpus / f"seed-{number}").write_bytes(seed)
@@ -78,25 +87,23 @@ def fuzz_one(name: str, seconds: int, corpus: Path) -> None:
         if key in known:
             return
         known.add(key)
-        FINDINGS.mkdir(exist_ok=True)
         digest = hashlib.sha256(data).hexdigest()[:12]
-        (FINDINGS / f"{digest}-{Path(reader.file).name}").write_bytes(reader.wrap(data))
+        (findings / f"{digest}-{Path(reader.file).name}").write_bytes(reader.wrap(data))
         print(f"FINDING {name}: {what} ({digest})", file=sys.stderr, flush=True)
 
     words = corpus.parent / "words.txt"
     words.write_text("".join(f'"{_escaped(word)}"\n' for word in (*reader.words, "0", "-1")))
     options = [
-        f"-max_total_time={seconds}",
+        limit,
         "-timeout=10",
         "-rss_limit_mb=2048",
         "-max_len=4096",
         "-print_final_stats=1",
         "-seed=1",
-        f"-artifact_prefix={FINDINGS.resolve()}/",
+        f"-artifact_prefix={findings}/",
         f"-dict={words}",
         str(corpus),
     ]
-    FINDINGS.mkdir(exist_ok=True)
     atheris.Setup([sys.argv[0], *options], run)
     atheris.Fuzz()
 
@@ -110,13 +117,25 @@ def _number(pattern: str, text: str) -> int:
     return int(found[-1]) if found else 0
 
 
-def _fuzzed(name: str, seconds: int) -> tuple[str, list[str]]:
+@cache
+def _still() -> tuple[str, ...]:
+    """What starts a process at the same addresses each time, which the fuzzer learns from too."""
+    start = ("setarch", "-R")
+    try:
+        tried = subprocess.run([*start, "true"], capture_output=True, check=False)
+    except FileNotFoundError:
+        return ()
+    return start if tried.returncode == 0 else ()
+
+
+def _fuzzed(name: str, limit: str) -> tuple[str, list[str]]:
     """Fuzz a reader in a process of its own; its row of the table, and what was found."""
     with tempfile.TemporaryDirectory() as folder:
         corpus = Path(folder) / "corpus"
         corpus.mkdir()
         done = subprocess.run(
-            [sys.executable, __file__, "--one", name, str(seconds), str(corpus)],
+            [*_still(), sys.executable, __file__, "--one", name, limit, str(corpus)],
+            env=os.environ | {"PYTHONHASHSEED": "0"},
             capture_output=True,
             text=True,
             errors="replace",
@@ -138,11 +157,16 @@ def _fuzzed(name: str, seconds: int) -> tuple[str, list[str]]:
 def main() -> int:
     from fuzz_readers import READERS
 
-    seconds = int(sys.argv[1]) if len(sys.argv) > 1 else 1800
+    same = sys.argv[1:2] == ["--same"]
+    seconds = int(sys.argv[1]) if len(sys.argv) > 1 and not same else 1800
     names = sys.argv[2:] or list(READERS)
     share = max(2, seconds // len(names))
+
+    def limit(name: str) -> str:
+        return f"-runs={READERS[name].files}" if same else f"-max_total_time={share}"
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        done = list(pool.map(lambda name: _fuzzed(name, share), names))
+        done = list(pool.map(lambda name: _fuzzed(name, limit(name)), names))
     rows = [row for row, _ in done]
     faults = [fault for _, found in done for fault in found]
     lines = [
@@ -156,7 +180,7 @@ def main() -> int:
         "|---|--:|--:|--:|--:|--:|",
         *rows,
     ]
-    if seconds >= 600 and len(names) == len(READERS):
+    if not same and seconds >= 600 and len(names) == len(READERS):
         (HERE / "fuzz.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     if not any(FINDINGS.glob("*")) and FINDINGS.is_dir():
         FINDINGS.rmdir()
@@ -165,6 +189,6 @@ def main() -> int:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
-        fuzz_one(sys.argv[2], int(sys.argv[3]), Path(sys.argv[4]))
+        fuzz_one(sys.argv[2], sys.argv[3], Path(sys.argv[4]))
     else:
         sys.exit(main())

@@ -45,6 +45,8 @@ class Reader:
         Makes the file of what the fuzzer gives: an archive of a text, for one.
     words : tuple of str
         Words that mean something to the reader.
+    files : int
+        How many files the fuzzer tries where every run is to try the same.
     """
 
     file: str
@@ -52,6 +54,7 @@ class Reader:
     read: Callable[[Path], object]
     wrap: Callable[[bytes], bytes] = bytes
     words: tuple[str, ...] = ()
+    files: int = 20_000
 
 
 def _binary_stl() -> bytes:
@@ -280,7 +283,7 @@ def _readers() -> Iterator[tuple[str, Reader]]:
         "STEP, before the kernel",
         Reader("x.step", (_step(),), check_step, words=("ISO-10303-21", "/*", "FACE")),
     )
-    yield "meshes to solids", Reader("x.bin", _solid_seeds(), _solid)
+    yield "meshes to solids", Reader("x.bin", _solid_seeds(), _solid, files=1_000)
     yield (
         "recipe",
         Reader("kit.toml", (b'model = "x.stl"\nseed = 1\nvoxel_mm = 12.5\n',), read_recipe),

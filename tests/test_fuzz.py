@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from fuzz_readers import READERS, glb_file, gltf_scene, ply_file, ply_strips, slicer_file
+from fuzz_readers import POINTS, READERS, glb_file, gltf_scene, ply_file, ply_strips, slicer_file
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -74,11 +74,33 @@ FOUND = {
         b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
         b"property float z\nproperty float x\nelement face 1\n"
         b"property list uchar int vertex_indices\nend_header\n0 0 0 0\n1 0 0 0\n5 0 1 0 1 0\n",
-        "different numbers of x, y and z",
+        "vertex has 'x' twice",
+    ),
+    "a strip is a number.ply": (
+        ply_strips().replace(b"list int int", b"float").replace(b"9 0 1 2 3 -1 0 2 1 3", b"2.5"),
+        "'vertex_indices' of a tristrips is a number",
+    ),
+    "a face is a number.ply": (
+        ply_file("ascii").replace(b"list uchar int vert", b"int vert").replace(b"3 0 2 1", b"4 0"),
+        "'vertex_indices' of a face is a number",
+    ),
+    "a shade is a list.ply": (
+        b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        b"property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+        b"property list uchar uchar red\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 2 9 9\n",
+        "'red' of a face is a list",
+    ),
+    "a corner is nan.ply": (
+        ply_strips().replace(b"9 0 1 2 3", b"9 0 1 nan 3"),
+        "no number of a vertex",
+    ),
+    "a corner is inf.ply": (
+        ply_strips().replace(b"9 0 1 2 3", b"9 0 1 1e999 3"),
+        "no number of a vertex",
     ),
     "list of a vertex.ply": (
         ply_with("property list uchar float x").replace(b"4 4", b"5 4"),
-        "Vertices were not",
+        "'x' of a vertex is a list",
     ),
 }
 
@@ -91,6 +113,15 @@ def test_what_was_found_is_named(name: str, tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=words) as caught:
         read_mesh(path)
     assert name in str(caught.value)
+
+
+def test_a_list_at_a_vertex_is_passed_over(tmp_path: Path) -> None:
+    content = ply_file("ascii").replace(
+        b"element face", b"property list int int tags\nelement face"
+    )
+    path = tmp_path / "tags.ply"
+    path.write_bytes(content.replace(b" 9 9 9\n", b" 9 9 9 2 7 7\n"))
+    assert read_mesh(path).vertices.tolist() == [list(map(float, p)) for p in POINTS]
 
 
 def test_rare_blanks_of_an_obj_are_blanks(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ _TYPES = {
 }  # fmt: skip
 #: Names of the list of a face's corners.
 _CORNERS = ("vertex_indices", "vertex_index")
+_COLOURS = ("red", "green", "blue")
 
 #: A property: its name, the type of its count (empty where it is no list), its type.
 _Property = tuple[str, str, str]
@@ -54,6 +55,7 @@ def _header(path: Path) -> tuple[str, list[tuple[str, int, list[_Property]]], by
                     f"{path.name}: line {number} of its header is damaged ({line.strip()[:60]!r}); "
                     "export it again"
                 )
+    _check_properties(path, elements)
     return form, elements, body
 
 
@@ -77,17 +79,17 @@ def triangles_only(path: Path) -> bool:
         False where some face has another number of corners.
     """
     form, elements, body = _header(path)
+    if any(counted for name, _, listed in elements if name != "face" for _, counted, _ in listed):
+        return False
     if form == "ascii":
         return not any(
             len(line.split(None, 1)) == 2 and line.split(None, 1)[0] not in (b"3", b"4")
             for line in _face_lines(elements, body)
         )
     size = 0
-    for name, count, properties in elements:
+    for _, count, properties in elements:
         for _, counted, kind in properties:
             width = np.dtype(kind).itemsize
-            if counted and name != "face":
-                return False
             size += count * (np.dtype(counted).itemsize + 3 * width if counted else width)
     return len(body) == size
 
@@ -133,19 +135,13 @@ def read_ply_polygons(path: Path, single: bool) -> RawMesh:
     points = read.get("vertex", {})
     if not all(axis in points for axis in "xyz"):
         raise ModelError(f"{path.name}: its vertices have no x, y and z; export it again")
-    listed_points = [listing for name, _, listing in elements if name == "vertex"]
-    if any(counted for listing in listed_points for _, counted, _ in listing):
-        raise ModelError(f"{path.name}: a vertex has a list of numbers; export it again")
-    if len({len(points[axis]) for axis in "xyz"}) > 1:
-        raise ModelError(
-            f"{path.name}: its vertices have different numbers of x, y and z; export it again"
-        )
     vertices = np.stack([np.asarray(points[axis], dtype=np.float64) for axis in "xyz"], axis=1)
     faces = read.get("face", {})
     listed: Any = next((faces[name] for name in _CORNERS if name in faces), [])
     strips = read.get("tristrips", {})
     listed_strips: Any = next((strips[name] for name in _CORNERS if name in strips), [])
-    polygons = [[int(corner) for corner in polygon] for polygon in listed]
+    polygons = [_whole(path, polygon) for polygon in listed]
+    listed_strips = [_whole(path, strip) for strip in listed_strips]
     for number, polygon in enumerate(polygons):
         if len(polygon) < 3:
             raise ModelError(
@@ -178,19 +174,48 @@ def read_ply_polygons(path: Path, single: bool) -> RawMesh:
     return RawMesh(vertices, triangles, float32=single, colours=colours)
 
 
+def _check_properties(path: Path, elements: list[tuple[str, int, list[_Property]]]) -> None:
+    """Refuse what has another shape than its name: a number for a list, a list for a number."""
+    for element, _, properties in elements:
+        names = [name for name, _, _ in properties]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ModelError(f"{path.name}: {element} has {twice!r} twice; export it again")
+        lists = {"face": _CORNERS, "tristrips": _CORNERS}.get(element, ())
+        for name, counted, _ in properties:
+            if name in lists and not counted:
+                raise ModelError(
+                    f"{path.name}: {name!r} of a {element} is a number, not a list of corners; "
+                    "export it again"
+                )
+            if counted and name in (*"xyz", *_COLOURS):
+                raise ModelError(
+                    f"{path.name}: {name!r} of a {element} is a list, not a number; export it again"
+                )
+
+
+def _whole(path: Path, corners: Any) -> list[int]:
+    """Corners as whole numbers; a text file may hold any number there."""
+    try:
+        return [int(corner) for corner in corners]
+    except (ValueError, OverflowError):
+        raise ModelError(
+            f"{path.name}: a face has a corner that is no number of a vertex; export it again"
+        ) from None
+
+
 def _shades(columns: dict[str, Any], count: int) -> Any:
-    names = ("red", "green", "blue")
-    if not all(name in columns for name in names) or count == 0:
+    if not all(name in columns for name in _COLOURS) or count == 0:
         return None
-    table = np.stack([np.asarray(columns[name], dtype=np.float64) for name in names], axis=1)
-    return np.clip(np.rint(table), 0, 255).astype(np.uint8)
+    table = np.stack([np.asarray(columns[name], dtype=np.float64) for name in _COLOURS], axis=1)
+    return np.clip(np.rint(np.nan_to_num(table)), 0, 255).astype(np.uint8)
 
 
 def _strip_triangles(strips: Any) -> Iterator[tuple[int, int, int]]:
     """Triangles of strips; -1 begins a new one, every second triangle is turned over."""
     for strip in strips:
         run: list[int] = []
-        for corner in [*map(int, strip), -1]:
+        for corner in [*strip, -1]:
             if corner >= 0:
                 run.append(corner)
                 continue
@@ -240,7 +265,7 @@ def _ascii_rows(
     words.reverse()  # taken from the end, where an empty list raises IndexError
     for name, count, properties in elements:
         columns: dict[str, Any] = {key: [] for key, _, _ in properties}
-        for _ in range(count):
+        for _ in range(count if properties else 0):
             for key, counted, _ in properties:
                 if counted:
                     columns[key].append([float(words.pop()) for _ in range(int(words.pop()))])
