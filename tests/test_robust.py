@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -218,3 +219,22 @@ main(["hang"])
     )
     assert result.returncode == 130, result.stderr
     assert "goes on from there" in result.stderr
+
+
+def test_threads_that_wait_do_not_hold_the_studio_after_its_end():
+    script = """
+import signal, threading, time
+import fabfold.cli.app as app
+app._LONGEST_END_S = 0.5
+signal.signal(signal.SIGTERM, app._stop_surely)
+threading.Thread(target=time.sleep, args=(60,)).start()
+print("up", flush=True)
+try:
+    time.sleep(60)
+except KeyboardInterrupt:
+    time.sleep(60)
+"""
+    run = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert run.stdout is not None and run.stdout.readline() == "up\n"
+    run.send_signal(signal.SIGTERM)
+    assert run.wait(timeout=30) == 130

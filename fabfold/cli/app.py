@@ -7,6 +7,7 @@ import io
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -108,6 +109,18 @@ class _Stopped(KeyboardInterrupt):
 
 
 def _stop(*_: object) -> None:
+    raise _Stopped
+
+
+#: Longest time, seconds, that threads of a server may hold the process after Ctrl-C.
+_LONGEST_END_S = 10.0
+
+
+def _stop_surely(*_: object) -> None:
+    """Ctrl-C where a server has threads of its own, which may swallow it or wait for a page."""
+    timer = threading.Timer(_LONGEST_END_S, os._exit, (130,))
+    timer.daemon = True
+    timer.start()
     raise _Stopped
 
 
@@ -384,6 +397,9 @@ def studio(
     with serve(source, None if output is None else str(output), port) as served:
         typer.echo(f"studio: {served.gate.address}\nCtrl-C ends it; every step is kept in the kit.")
         sys.stdout.flush()
+        for name in (signal.SIGTERM, signal.SIGINT):
+            if signal.getsignal(name) is _stop:  # else a shell ignores it
+                signal.signal(name, _stop_surely)
         served.run(browser=browser)
 
 

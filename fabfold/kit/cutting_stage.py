@@ -2,19 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
+from fabfold.errors import NoTreeError
 from fabfold.lattice.rotations import rotation_of_degrees
 from fabfold.lattice.template import Template
 from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
+from fabfold.recipe.recipe_wishes import weights_of
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.regions import Region
+from fabfold.tree.bound import closed_at_most
+from fabfold.tree.problem import from_features
+from fabfold.voxels.features import features
 from fabfold.voxels.thickening import Cut, cut_thick
 from fabfold.voxels.voxel_model import Voxels
 from fabfold.voxels.voxelize import voxelize
 
-__all__ = ["cut_model"]
+__all__ = ["closing_rate", "cut_model"]
+
+
+def closing_rate(recipe: Recipe, template: Template) -> Callable[[Voxels], float]:
+    """What voxelizations of a model are rated by: how far they could close the box.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        Weights and joints.
+    template : Template
+        The target shape, as it is filled.
+
+    Returns
+    -------
+    callable
+        Takes voxels and returns the share of :func:`fabfold.tree.bound.closed_at_most`; 0 where no
+        tree can join them.
+    """
+
+    def rate(voxels: Voxels) -> float:
+        try:
+            problem = from_features(
+                voxels,
+                features(voxels),
+                template,
+                weights_of(recipe),
+                joints=recipe.joints,
+                share=recipe.share,
+            )
+        except NoTreeError:
+            return 0.0
+        return closed_at_most(problem)
+
+    return rate
 
 
 def cut_model(
@@ -55,6 +94,7 @@ def cut_model(
             pitch=recipe.pitch,
             drop_below=recipe.drop_below,
             regions=regions,
+            rate=closing_rate(recipe, template),
             progress=progress,
         )
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fabfold.errors import NoVoxelsError
+from fabfold.kit.cutting_stage import closing_rate
 from fabfold.lattice.shipped import load_template
 from fabfold.lattice.template import Template
 from fabfold.recipe.recipe import Recipe
-from fabfold.recipe.recipe_wishes import weights_of
 from fabfold.solid.closed_solid import Solid
-from fabfold.tree.bound import closed_at_most
-from fabfold.tree.problem import from_features
-from fabfold.voxels.features import features
 from fabfold.voxels.voxelize import voxelize
 
 __all__ = ["BoxAdvice", "advised_box"]
@@ -91,10 +88,7 @@ def advised_box(
             )
         except NoVoxelsError:
             continue
-        problem = from_features(
-            voxels, features(voxels), box, weights_of(recipe), joints=recipe.joints
-        )
-        found = BoxAdvice(box.name, closed_at_most(problem))
+        found = BoxAdvice(box.name, closing_rate(recipe, box)(voxels))
         if found.at_most > (at_most + _BETTER if best is None else best.at_most):
             best = found
     return best

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +32,14 @@ _REFINED = 6
 _LARGER = ((22, 23), (24, 25), (26, 28), (30, 33), (36, 40))
 #: Placements of one size that are cut, until as many as wanted will do.
 _TRIES = 16
+#: Placements of one size that are cut and rated, and cells of all of them together: on a large
+#: template a rating takes long.
+_RATED = 28
+_RATED_CELLS = 1800
+#: So many sizes are rated, the fullest first: of smaller ones any does, they fold at once.
+_RATED_SIZES = 2
+#: Digits of a rating: more than these depend on rounding, and so on how the model lies.
+_RATING_DIGITS = 4
 #: Two voxelizations whose sorted fills differ by less than this on average are the same.
 _SAME_FILL = 0.012
 #: Voxelizations of different size that are looked for, and how much of a template the smallest
@@ -60,6 +69,7 @@ def voxelize(
     max_offset: int = 4,
     max_loss: float = MAX_LOSS,
     regions: Sequence[Region] = (),
+    rate: Callable[[Voxels], float] | None = None,
     progress: Progress | None = None,
 ) -> list[Voxels]:
     """Cut a solid into voxels that the template can hold.
@@ -93,13 +103,17 @@ def voxelize(
         Largest share of the model's volume that may be lost in dropped cells.
     regions : sequence of Region
         Parts of the model that shall lie in few cells; each cell more costs as much as a sliver.
+    rate : callable, optional
+        Says of voxels how good they are, the more the better: of more placements than are wanted
+        those rated best are taken. Not where there are `regions`.
     progress : Progress, optional
         Hears of the stages of the search.
 
     Returns
     -------
     list of Voxels
-        Different ones, best first: most total fill, less 0.5 a sliver, less lost material. The
+        Different ones, best first: rated best; most total fill, less 0.5 a sliver, less lost
+        material. The
         counts of both checkerboard colours fit the template, and the voxels hang together through
         printed contacts. Of four, three leave a part of the template free, each more than the one
         before, see :func:`fill_shares`; not where `pitch` or `origin` is given.
@@ -146,7 +160,7 @@ def voxelize(
         ranked = [RankedGrid(0.0, 0, float(value), (x, y, z)) for value in pitches]
     shares = fill_shares(len(template))[:results] if free else (1.0,)
     chosen: list[RefinedGrid] = []
-    done: list[tuple[float, Voxels]] = []
+    done: list[_Cut] = []
     for place, share in enumerate(shares):
         count = len(range(place, results, len(shares)))
         here, some = refinement, ranked if centre is not None else ranked[:shortlist]
@@ -155,13 +169,14 @@ def voxelize(
             some = here.rank_again(ranked, pitches * share ** (-1 / 3))
             some = some[: max(1, shortlist // _FEWER)]
         found = _refined_grids(here, some, free, centre is not None, regions)
-        done += _finish(here, found, chosen, count, max_loss, regions)
+        judge = rate if place < _RATED_SIZES and not regions else None
+        done += _finish(here, found, chosen, count, max_loss, regions, judge)
         if place == 0:
             full = found
         progress.update(0.4 + 0.6 * (place + 1) / len(shares), f"{len(done)} voxelizations")
     if not done:
         raise NoVoxelsError(_nearest(refinement, full, max_loss))
-    return [voxels for _, voxels in sorted(done, key=lambda pair: pair[0])]
+    return [cut.voxels for cut in sorted(done, key=lambda cut: cut.sort_key)]
 
 
 def fill_shares(cells: int) -> tuple[float, ...]:
@@ -325,6 +340,21 @@ def _shortlist(
     return chosen
 
 
+@dataclass(frozen=True)
+class _Cut:
+    """A grid that was cut: its rating, its price, the lower the better, and its voxels."""
+
+    rating: float
+    price: float
+    grid: RefinedGrid
+    voxels: Voxels
+
+    @property
+    def sort_key(self) -> tuple[float, float]:
+        """Orders cuts, best first."""
+        return (-self.rating, self.price)
+
+
 def _finish(
     refinement: Refinement,
     found: Sequence[RefinedGrid],
@@ -332,23 +362,29 @@ def _finish(
     count: int,
     max_loss: float,
     regions: Sequence[Region],
-) -> list[tuple[float, Voxels]]:
-    """Cut the best grids and check the voxels: price, the lower the better, and voxels.
+    rate: Callable[[Voxels], float] | None,
+) -> list[_Cut]:
+    """Cut the best grids and check the voxels; of those that will do, `count` are taken.
 
     Grids that are taken are added to `chosen`; a grid like an earlier one is passed over.
     """
-    done: list[tuple[float, Voxels]] = []
+    tries, wanted = _TRIES, count
+    if rate is not None:
+        wanted = max(count, min(_RATED, _RATED_CELLS // refinement.capacity.cells))
+        tries = max(tries, wanted)
+    done: list[_Cut] = []
     # Sampling the warped model can still cost a cell its place, so some more than are wanted.
-    for grid in _shortlist(refinement, found, chosen, _TRIES) or found[:_TRIES]:
+    for grid in _shortlist(refinement, found, chosen, tries) or found[:tries]:
         voxels, _, _ = refinement.cut(grid)
         if voxels is None or voxels.lost_volume > max_loss:
             continue
-        placement = refinement.placement(grid)
-        price = region_cut_cost(regions, placement) - voxels.energy["score"]
-        done.append((price, voxels))
-        chosen.append(grid)
-        if len(done) == count:
+        price = region_cut_cost(regions, refinement.placement(grid)) - voxels.energy["score"]
+        rating = 0.0 if rate is None else round(rate(voxels), _RATING_DIGITS)
+        done.append(_Cut(rating, price, grid, voxels))
+        if len(done) == wanted:
             break
+    done = sorted(done, key=lambda cut: cut.sort_key)[:count] if rate is not None else done
+    chosen += [cut.grid for cut in done]
     return done
 
 
