@@ -1,9 +1,10 @@
 """How good the trees are and how long they take: writes benchmarks/energies.md and its plot.
 
-    python benchmarks/energies.py [NAME ...] [--effort normal] [--seed 1] [--models DIR]
+    python benchmarks/energies.py [NAME ...] [--effort normal] [--seed 1] [--joints S]
 
 Each model is voxelized and searched (``fabfold fit``) in a fresh process with one worker, the
-paper's weights, single hinges and warm kernels. Seconds are processor seconds of that process.
+paper's weights and warm kernels; by single hinges, or the `--joints` asked for, which are printed
+and not kept. Seconds are processor seconds of that process.
 Beside them stand the figures of before the search was changed (``energies_before.json``): one
 ``fabfold fit`` with one worker for each model, start of the program included. Results are kept in
 ``energies.json``; models that are named are measured again. Models of the paper and of others are
@@ -52,7 +53,7 @@ MODELS: dict[str, tuple[str, str]] = {
 MARKS = (5, 10, 20, 40, 80, 160)
 
 
-def measure(source: str, template: str, effort: str, seed: int) -> dict[str, Any]:
+def measure(source: str, template: str, effort: str, seed: int, joints: str) -> dict[str, Any]:
     """Voxelize and search one model in this process; the row of the table."""
     from fabfold.errors import FabfoldError
     from fabfold.kit.kit import Kit
@@ -78,7 +79,8 @@ def measure(source: str, template: str, effort: str, seed: int) -> dict[str, Any
     rounds.Tally = Watched  # type: ignore[misc]
     row: dict[str, Any] = {"effort": effort, "seed": seed}
     start = time.process_time()
-    kit = Kit.from_model(source, template=template, effort=effort, seed=seed, workers=1)
+    options: dict[str, Any] = {"effort": effort, "seed": seed, "joints": joints}
+    kit = Kit.from_model(source, template=template, workers=1, **options)
     try:
         kit.voxelize()
         begin = time.process_time()
@@ -220,11 +222,12 @@ def main() -> int:
     parser.add_argument("names", nargs="*")
     parser.add_argument("--effort", default="normal")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--joints", default="S")
     parser.add_argument("--models", type=Path, default=SHARED)
     parser.add_argument("--one", nargs=2, metavar=("SOURCE", "TEMPLATE"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
-        print(json.dumps(measure(*options.one, options.effort, options.seed)))
+        print(json.dumps(measure(*options.one, options.effort, options.seed, options.joints)))
         return 0
     kept, old = HERE / "energies.json", HERE / "energies_before.json"
     rows = json.loads(kept.read_text("utf-8")) if kept.is_file() else {}
@@ -236,10 +239,20 @@ def main() -> int:
         if not here or (name not in options.names if options.names else key in rows):
             continue
         call = [sys.executable, __file__, "--one", path, template]
-        call += ["--effort", options.effort, "--seed", str(options.seed)]
+        call += [
+            "--effort",
+            options.effort,
+            "--seed",
+            str(options.seed),
+            "--joints",
+            options.joints,
+        ]
         done = subprocess.run(call, capture_output=True, text=True, check=False)
         if done.returncode:
             print(f"{key}: {done.stderr[-500:]}", file=sys.stderr)
+            continue
+        if options.joints != "S":
+            print(f"{key}, {options.joints}: {done.stdout.strip()}", flush=True)
             continue
         # Another run may have written meanwhile.
         rows = json.loads(kept.read_text("utf-8")) if kept.is_file() else {}

@@ -223,10 +223,11 @@ main(["hang"])
 
 def test_threads_that_wait_do_not_hold_the_studio_after_its_end():
     script = """
-import signal, threading, time
-import fabfold.cli.app as app
-app._LONGEST_END_S = 0.5
-signal.signal(signal.SIGTERM, app._stop_surely)
+import threading, time
+from fabfold.cli import stopping
+stopping._LONGEST_END_S = 0.5
+stopping.hear_stops()
+stopping.hear_stops(surely=True)
 threading.Thread(target=time.sleep, args=(60,)).start()
 print("up", flush=True)
 try:

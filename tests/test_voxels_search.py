@@ -325,3 +325,20 @@ def test_ranked_translations_agree_with_judge():
         assert rows[row, 1] == fit.kept
         assert rows[row, 2] == fit.excess
         assert rows[row, 3] == pytest.approx(fit.lost / (fit.lost + fit.fill))
+
+
+def test_of_a_size_one_half_is_rated_best_and_the_other_is_the_fullest():
+    seen = []
+
+    def rate(voxels):
+        seen.append(voxels)
+        return float(len(voxels)) - voxels.energy["fill"]  # the emptier the better
+
+    template = load_template("box-2x2x2")
+    found = voxelize(torus(), template, placements=30, shortlist=12, results=2, rate=rate)
+    ratings = [round(rate(voxels), 4) for voxels in found]
+    seen = seen[:-2]
+    assert len(found) == 2 < len(seen)
+    assert ratings[0] == max(round(rate(voxels), 4) for voxels in list(seen))
+    scores = [voxels.energy["score"] for voxels in seen if voxels is not found[0]]
+    assert found[1].energy["score"] == max(scores)

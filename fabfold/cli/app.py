@@ -5,9 +5,7 @@ from __future__ import annotations
 import functools
 import io
 import os
-import signal
 import sys
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -74,6 +72,7 @@ from fabfold.cli.command_options import (
     number_or_text,
 )
 from fabfold.cli.model_file_check import check_model_file, is_model_file
+from fabfold.cli.stopping import hear_stops
 from fabfold.errors import (
     CheckError,
     FabfoldError,
@@ -98,30 +97,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-
-
-class _Stopped(KeyboardInterrupt):
-    """Ctrl-C.
-
-    Python ends by the signal itself, not by our exit code, where a plain KeyboardInterrupt passed
-    through an ``exec`` of a string, as the making of a dataclass is, even if it was caught later.
-    """
-
-
-def _stop(*_: object) -> None:
-    raise _Stopped
-
-
-#: Longest time, seconds, that threads of a server may hold the process after Ctrl-C.
-_LONGEST_END_S = 10.0
-
-
-def _stop_surely(*_: object) -> None:
-    """Ctrl-C where a server has threads of its own, which may swallow it or wait for a page."""
-    timer = threading.Timer(_LONGEST_END_S, os._exit, (130,))
-    timer.daemon = True
-    timer.start()
-    raise _Stopped
 
 
 def _guarded(command: Callable[..., None]) -> Callable[..., None]:
@@ -397,9 +372,7 @@ def studio(
     with serve(source, None if output is None else str(output), port) as served:
         typer.echo(f"studio: {served.gate.address}\nCtrl-C ends it; every step is kept in the kit.")
         sys.stdout.flush()
-        for name in (signal.SIGTERM, signal.SIGINT):
-            if signal.getsignal(name) is _stop:  # else a shell ignores it
-                signal.signal(name, _stop_surely)
+        hear_stops(surely=True)
         served.run(browser=browser)
 
 
@@ -488,9 +461,7 @@ def _root(
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with 0, 1, 2, 3 or 130 (see ``fabfold.errors``)."""
-    signal.signal(signal.SIGTERM, _stop)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else a shell ignores it
-        signal.signal(signal.SIGINT, _stop)
+    hear_stops()
     # Packages start Python too (glfw does, for MuJoCo): none of them takes a numpy.py in the
     # working folder for numpy.
     os.environ["PYTHONSAFEPATH"] = "1"

@@ -54,10 +54,10 @@ class Rung:
 def _rungs(
     effort: Effort,
     closing: tuple[int, int],
-    promising: tuple[int, int],
+    promising: tuple[tuple[int, int], ...],
     best: tuple[tuple[int, int], ...],
 ) -> tuple[Rung, ...]:
-    """Rungs from seeds and voxelizations, twice, and from seeds and kicks."""
+    """Rungs from seeds and voxelizations, and from seeds and kicks."""
     first = replace(
         effort,
         restarts=12,
@@ -72,15 +72,20 @@ def _rungs(
     return (
         Rung("roomy", 1, first),
         Rung("closing", closing[0], search, closing[1]),
-        Rung("promising", promising[0], search, promising[1]),
+        *(Rung("promising", seeds, search, options) for seeds, options in promising),
         *(Rung("best", seeds, replace(effort, kicks=kicks)) for seeds, kicks in best),
     )
 
 
 _SCHEDULES: dict[str, tuple[Rung, ...]] = {
-    "quick": _rungs(EFFORTS["quick"], (3, 3), (1, 1), ((1, 4),)),
-    "normal": _rungs(EFFORTS["normal"], (6, 3), (6, 2), ((2, 4), (2, 4))),
-    "thorough": _rungs(EFFORTS["thorough"], (12, 6), (24, 3), ((6, 20), (4, 40), (4, 40), (4, 40))),
+    "quick": _rungs(EFFORTS["quick"], (2, 2), ((2, 1),), ((1, 4),)),
+    "normal": _rungs(EFFORTS["normal"], (3, 3), ((4, 2), (4, 1)), ((2, 4), (2, 4))),
+    "thorough": _rungs(
+        EFFORTS["thorough"],
+        (12, 6),
+        ((12, 3), (12, 2)),
+        ((6, 20), (4, 40), (4, 40), (4, 40)),
+    ),
 }
 
 

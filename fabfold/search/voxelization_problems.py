@@ -82,6 +82,8 @@ def usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> lis
 
 #: Voxelizations whose numbers of voxels differ by no more than this are of one size.
 _ALIKE = 2
+#: Sizes, the fullest ones, that are tried before the others.
+_FULLEST = 2
 
 
 class VoxelizationProblems:
@@ -162,8 +164,8 @@ class VoxelizationProblems:
     def closing_order(self) -> list[int]:
         """Voxelizations by how closed the box could be; with --protect by cuts.
 
-        Of each size the best comes first, and only then the second of any: the fuller ones close
-        the box better, where anything folds on them.
+        Of the two fullest sizes the best comes first, then the second of both: they close the box
+        better, where anything folds on them. Then come the other sizes in the same way.
         """
         if self._closing is None:
             order = list(range(len(self.options)))
@@ -171,15 +173,23 @@ class VoxelizationProblems:
                 most = [self.at_most(option) for option in order]
                 # Of equals the fuller one.
                 order.sort(key=lambda k: (-most[k], -len(self.options[k])))
+                rank = self._size_ranks()
                 turn: dict[int, int] = {}
-                before: list[int] = []
-                for option in order:
-                    size = len(self.options[option])
-                    turn[option] = sum(abs(len(self.options[k]) - size) <= _ALIKE for k in before)
-                    before.append(option)
-                order.sort(key=lambda k: turn[k])
+                for place, option in enumerate(order):
+                    turn[option] = sum(rank[k] == rank[option] for k in order[:place])
+                order.sort(key=lambda k: (rank[k] >= _FULLEST, turn[k]))
             self._closing = order
         return self._closing
+
+    def _size_ranks(self) -> list[int]:
+        """For each voxelization the number of sizes that are fuller than its own."""
+        ranks: dict[int, int] = {}
+        head, rank = None, -1
+        for size in sorted({len(voxels) for voxels in self.options}, reverse=True):
+            if head is None or head - size > _ALIKE:
+                head, rank = size, rank + 1
+            ranks[size] = rank
+        return [ranks[len(voxels)] for voxels in self.options]
 
     def promising_order(self, found: Mapping[int, float]) -> list[int]:
         """Voxelizations by the best tree found on each, or by what is to be expected.

@@ -34,8 +34,8 @@ _LARGER = ((22, 23), (24, 25), (26, 28), (30, 33), (36, 40))
 _TRIES = 16
 #: Placements of one size that are cut and rated, and cells of all of them together: on a large
 #: template a rating takes long.
-_RATED = 28
-_RATED_CELLS = 1800
+_RATED = 20
+_RATED_CELLS = 1280
 #: So many sizes are rated, the fullest first: of smaller ones any does, they fold at once.
 _RATED_SIZES = 2
 #: Digits of a rating: more than these depend on rounding, and so on how the model lies.
@@ -105,7 +105,7 @@ def voxelize(
         Parts of the model that shall lie in few cells; each cell more costs as much as a sliver.
     rate : callable, optional
         Says of voxels how good they are, the more the better: of more placements than are wanted
-        those rated best are taken. Not where there are `regions`.
+        half of those that are taken are rated best. Not where there are `regions`.
     progress : Progress, optional
         Hears of the stages of the search.
 
@@ -160,7 +160,7 @@ def voxelize(
         ranked = [RankedGrid(0.0, 0, float(value), (x, y, z)) for value in pitches]
     shares = fill_shares(len(template))[:results] if free else (1.0,)
     chosen: list[RefinedGrid] = []
-    done: list[_Cut] = []
+    done: list[_RatedCut] = []
     for place, share in enumerate(shares):
         count = len(range(place, results, len(shares)))
         here, some = refinement, ranked if centre is not None else ranked[:shortlist]
@@ -341,7 +341,7 @@ def _shortlist(
 
 
 @dataclass(frozen=True)
-class _Cut:
+class _RatedCut:
     """A grid that was cut: its rating, its price, the lower the better, and its voxels."""
 
     rating: float
@@ -363,7 +363,7 @@ def _finish(
     max_loss: float,
     regions: Sequence[Region],
     rate: Callable[[Voxels], float] | None,
-) -> list[_Cut]:
+) -> list[_RatedCut]:
     """Cut the best grids and check the voxels; of those that will do, `count` are taken.
 
     Grids that are taken are added to `chosen`; a grid like an earlier one is passed over.
@@ -372,7 +372,7 @@ def _finish(
     if rate is not None:
         wanted = max(count, min(_RATED, _RATED_CELLS // refinement.capacity.cells))
         tries = max(tries, wanted)
-    done: list[_Cut] = []
+    done: list[_RatedCut] = []
     # Sampling the warped model can still cost a cell its place, so some more than are wanted.
     for grid in _shortlist(refinement, found, chosen, tries) or found[:tries]:
         voxels, _, _ = refinement.cut(grid)
@@ -380,10 +380,15 @@ def _finish(
             continue
         price = region_cut_cost(regions, refinement.placement(grid)) - voxels.energy["score"]
         rating = 0.0 if rate is None else round(rate(voxels), _RATING_DIGITS)
-        done.append(_Cut(rating, price, grid, voxels))
+        done.append(_RatedCut(rating, price, grid, voxels))
         if len(done) == wanted:
             break
-    done = sorted(done, key=lambda cut: cut.sort_key)[:count] if rate is not None else done
+    if rate is not None:
+        # The other half by price: full cells hold together where a high rating may not.
+        rated = sorted(done, key=lambda cut: cut.sort_key)
+        best = rated[: -(-count // 2)]
+        others = sorted(rated[len(best) :], key=lambda cut: cut.price)
+        done = best + others[: count - len(best)]
     chosen += [cut.grid for cut in done]
     return done
 
