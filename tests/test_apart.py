@@ -257,6 +257,7 @@ def test_bodies_lie_flat_inside_the_bed_and_apart(made):
             assert apart >= 4.0 - 1e-6
 
 
+@pytest.mark.slow
 def test_a_small_bed_takes_more_plates_and_a_tiny_one_names_the_voxel_that_fits(made):
     tree, _, joinery, _ = made
     bores = pin_bores(tree, joinery)
@@ -272,11 +273,10 @@ def test_a_small_bed_takes_more_plates_and_a_tiny_one_names_the_voxel_that_fits(
 
 
 @pytest.fixture(scope="module")
-def kit_folder(bar_kit, bar, bar_options, tmp_path_factory):
+def kit_folder(searched, bar, bar_options, tmp_path_factory):
     """The bar's kit for a filament printer, exported."""
-    folder = tmp_path_factory.mktemp("apart") / "bar-kit"
+    folder = searched(tmp_path_factory.mktemp("apart") / "bar-kit")
     kit = Kit.from_model(bar, folder=folder, workers=1, profile="fdm-pla-0.4", **bar_options)
-    kit._results["fold"] = bar_kit.fold()
     kit.export()
     return kit, folder
 
@@ -352,6 +352,7 @@ def test_a_kit_comes_back_from_its_folder(kit_folder):
     assert again.joinery.face_gap_mm == 0.2
 
 
+@pytest.mark.slow
 def test_a_filament_printer_is_told_that_a_closed_kit_fuses(bar_kit):
     from fabfold.kit.checking import run_checks
 
@@ -458,6 +459,7 @@ def test_a_kit_that_does_not_go_together_fails_its_check_and_says_where(made):
     assert "in the way of the pin" in pins.note
 
 
+@pytest.mark.slow
 def test_what_was_seen_comes_back_with_the_kit(kit_folder):
     built = kit_folder[0].join()
     again = load_built(kit_folder[0]._store, save_built(kit_folder[0]._store, built))

@@ -24,12 +24,12 @@ PLAIN = "".join(c if c.isprintable() else "_" for c in NAME)
 
 
 @pytest.fixture(scope="module")
-def folder(bar, bar_options, tmp_path_factory):
+def folder(searched, bar, bar_options, tmp_path_factory):
     """The kit of a model with such a name."""
     home = tmp_path_factory.mktemp("named")
     model = home / f"{NAME}.stl"
     model.write_bytes(bar.read_bytes())
-    kit = Kit.from_model(model, folder=home / "kit", workers=1, **bar_options)
+    kit = Kit.from_model(model, folder=searched(home / "kit"), workers=1, **bar_options)
     kit.export()
     return kit.folder
 

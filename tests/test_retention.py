@@ -273,12 +273,11 @@ def test_what_a_way_of_printing_cannot_hold_is_refused_with_a_remedy(options, to
 
 
 @pytest.mark.slow
-def test_a_kit_tells_its_pauses_and_what_friction_holds(bar_kit, bar, bar_options, tmp_path):
+def test_a_kit_tells_its_pauses_and_what_friction_holds(searched, bar, bar_options, tmp_path):
     kit = Kit.from_model(
-        bar, folder=tmp_path / "kit", workers=1, profile="fdm-pla-0.4",
+        bar, folder=searched(tmp_path / "kit"), workers=1, profile="fdm-pla-0.4",
         retention="magnet+friction", retention_in_a=True, magnet_fit="enclosed", **bar_options,
     )  # fmt: skip
-    kit._results["fold"] = bar_kit.fold()
     folder = kit.export()
     report = json.loads((folder / "report.json").read_text("utf-8"))
     assert report["verdict"] == "ok"
@@ -299,33 +298,36 @@ def test_a_kit_tells_its_pauses_and_what_friction_holds(bar_kit, bar, bar_option
     assert held["hinges held in the model"]["figure"] > 0
     rubbing = data["friction_pins"]
     assert ([] if rubbing is None else rubbing["hinges"]) == data["held_by_friction_only"]
-    assert open_kit(str(folder)).join().retention == kit.join().retention
+    assert open_kit(str(folder), workers=1).join().retention == kit.join().retention
 
 
 @pytest.mark.slow
 def test_a_certificate_names_the_friction_pins_that_it_leaves_out(
-    bar_kit, bar, bar_options, tmp_path
+    searched, bar, bar_options, tmp_path
 ):
     kit = Kit.from_model(
-        bar, folder=tmp_path / "kit", workers=1, profile="fdm-pla-0.4", retention="friction",
-        **bar_options,
+        bar, folder=searched(tmp_path / "kit"), workers=1, profile="fdm-pla-0.4",
+        retention="friction", **bar_options,
     )  # fmt: skip
-    kit._results["fold"] = bar_kit.fold()
     built = kit.join()
     names = [built.planned.tree.hinges[hinge].name for hinge in built.retention.friction.hinges]
     assert names
     assert all(name in built.planned.motion.certificate["geometry"] for name in names)
-    again = open_kit(str(tmp_path / "kit")).join()
+    again = open_kit(str(tmp_path / "kit"), workers=1).join()
     assert again.retention == built.retention
     assert [pin.tight for pin in again.joinery.pins] == [pin.tight for pin in built.joinery.pins]
 
 
 @pytest.mark.slow
-def test_blocks_are_a_kit_like_any_other(bar_kit, bar, bar_options, tmp_path):
+def test_blocks_are_a_kit_like_any_other(bar_kit, searched, bar, bar_options, tmp_path):
     kit = Kit.from_model(
-        bar, folder=tmp_path / "kit", workers=1, skin="lattice", retention="magnet", **bar_options
+        bar,
+        folder=searched(tmp_path / "kit"),
+        workers=1,
+        skin="lattice",
+        retention="magnet",
+        **bar_options,
     )
-    kit._results["fold"] = bar_kit.fold()
     folder = kit.export()
     report = json.loads((folder / "report.json").read_text("utf-8"))
     assert report["verdict"] == "ok"
