@@ -126,6 +126,7 @@ def test_fits_the_printer_is_about_the_pose(row):
     assert "the kit as the box" in box.note
 
 
+@pytest.mark.slow
 def test_checks_and_keys_follow_the_pose(bar_kit):
     built, recipe, template = bar_kit.join(), bar_kit.recipe, bar_kit.template
     box = print_mode(POWDER, "in-place", pose="b")

@@ -36,6 +36,7 @@ def alone(problem):
     return search(problem, range(4), LatticeFoldability(), EFFORT, workers=1)
 
 
+@pytest.mark.slow
 def test_best_first_from_every_seed(alone):
     totals = [c.energy["total"] for c in alone]
     assert totals == sorted(totals)

@@ -112,6 +112,7 @@ def _prove_each(tree, path, meshes):
         certify(tree, _partial(tree, path), meshes, 10.0, (0, 0, 0), 0.2)
 
 
+@pytest.mark.slow
 def test_every_order_of_a_kits_groups_is_certified(bar_kit):
     built = bar_kit.join()
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery

@@ -95,6 +95,7 @@ def test_pairs_that_cannot_be_rigid_turn_or_part():
         assert check_tree(candidate.tree) == []
 
 
+@pytest.mark.slow
 def test_surface_decides_which_way_a_strip_folds():
     depth = np.full((4, 6), 0.1)
     # The +y faces are hollow: better inside the folded box than outside.
