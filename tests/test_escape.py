@@ -71,6 +71,7 @@ def test_gaps_and_nooks_that_the_ball_does_not_fit_are_no_chambers():
     assert find_chambers([body(block((0, 0, 0), (24, 24, 24)))], 3.5) == []
 
 
+@pytest.mark.slow
 def test_thin_walls_keep_powder_in():
     can = block((0, 0, 0), (20, 20, 20)) - block((0.5, 0.5, 0.5), (19.5, 19.5, 19.5))
     assert len(find_chambers([body(can)], 2.0)) == 1

@@ -268,6 +268,7 @@ def test_a_barrel_may_groove_a_link_but_not_cut_it(across, fate):
         assert tally.links_mm3 > 1.0
 
 
+@pytest.mark.slow
 def test_the_same_bytes_again():
     tree = hand_tree(*CHAINS["D beside S"])
     one, other = build(tree)[2], build(tree)[2]

@@ -98,6 +98,7 @@ def test_a_seed_that_raises_is_left_out_and_the_others_return(problem, alone):
         assert "ZeroDivisionError" in heard.done[1].why
 
 
+@pytest.mark.slow
 def test_where_every_seed_fails_it_is_said_and_not_taken_for_no_fold(problem):
     judge = Poisoned(own_question(problem, 7, (), EFFORT), exits=False)
     with pytest.raises(WorkerError, match="every seed failed"):

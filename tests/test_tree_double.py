@@ -202,6 +202,7 @@ def test_trees_with_links_survive_their_file(tree):
         assert np.array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_the_checker_sees_what_is_wrong_with_a_link(tree):
     made = tree.tree
     number = next(i for i, edge in enumerate(made.edges) if edge.kind == "D")

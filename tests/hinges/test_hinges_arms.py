@@ -111,6 +111,7 @@ def test_the_fit_looks_at_bodies_on_arms():
         hinge.fit(box, bodies(hinge, 20.0, 10.0, long=30)[1])
 
 
+@pytest.mark.slow
 def test_what_reaches_below_a_thin_body_is_trimmed():
     hinge = SingleHinge(40, clearance=0.3, leaf=Arm())
     box, lid = bodies(hinge, 20.0, 4.0)
@@ -132,6 +133,7 @@ def test_as_meshes():
         double_hinge_meshes(20, 0.3, leaf=Arm())
 
 
+@pytest.mark.slow
 def test_a_loose_pin_and_play():
     hinge = SingleHinge(60, knuckles=5, pin=FilamentPin(), clearance=0.3, leaf=Arm.pair(12.0))
     assert play(hinge).radial == pytest.approx(0.2)
@@ -141,6 +143,7 @@ def test_a_loose_pin_and_play():
     assert pytest.approx(60) == hardware.bounding_box().size.Z
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own", [0, 1])
 def test_on_an_edge_of_either_body(own):
     hinge = SingleHinge.along(

@@ -43,6 +43,7 @@ def test_bodies_side_by_side(own: str):
     assert pytest.approx(18.3 + 36) == other.bounding_box().max.Z
 
 
+@pytest.mark.slow
 def test_a_lid_on_its_box_opens_at_the_back():
     box, lid = Box(60, 40, 30), Pos(0, 0, 15.3 + 10) * Box(60, 40, 20)
     edge = upper_edge(box, Axis.Y)

@@ -278,6 +278,7 @@ def test_nonsense_is_refused_in_a_sentence(make, words):
         make()
 
 
+@pytest.mark.slow
 def test_panels_that_overlap_when_folded_are_refused():
     cross = Box(120, 36, 2, align=LYING) + Box(36, 120, 2, align=LYING)
     for x in (-1, 1):

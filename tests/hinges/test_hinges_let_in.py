@@ -121,6 +121,7 @@ def test_a_bracket_may_fill_a_hollow():
     assert plain.volume > fitted.volume
 
 
+@pytest.mark.slow
 def test_builders_are_bodies_and_two_solids_are_none():
     parent, child = pair()
     with BuildPart() as built:

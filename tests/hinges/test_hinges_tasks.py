@@ -218,6 +218,7 @@ def test_an_assembly_of_cadquery_closes_by_constraints():
     assert box.val().distance(closed) == pytest.approx(0.3, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_hinge_in_inches():
     hinge = SingleHinge("2 in", clearance="12 thou", pin=ScrewPin("#6"), leaf=Leaf(19, 3))
     parent, child = hinge.parent_half, hinge.child_half
@@ -263,6 +264,7 @@ def test_a_lid_snaps_shut_on_its_arc():
         SnapTongue(replace(spec, catch=0.4))
 
 
+@pytest.mark.slow
 def test_a_screw_with_a_sunk_nut():
     hinge = SingleHinge(
         40, clearance=0.3, pin=ScrewPin("M3", end="nut", sunk=True), leaf=Leaf(16, 3)
