@@ -11,7 +11,7 @@ import zipfile
 from html.parser import HTMLParser
 
 import pytest
-from test_robust import fabfold
+from test_robust import command
 
 from fabfold.errors import harmless
 from fabfold.kit.kit import Kit, open_kit
@@ -94,10 +94,11 @@ def test_the_terminal_shows_commands_instead_of_obeying():
     assert harmless("ü漢 [red]") == "ü漢 [red]"
 
 
-def test_what_is_refused_is_shown_as_it_is(tmp_path):
+def test_what_is_refused_is_shown_as_it_is(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "[red]\x1b[31m.stl").write_bytes(b"nothing")
-    done = fabfold("inspect", "[red]\x1b[31m.stl", cwd=tmp_path)
-    assert done.returncode == 2
+    done = command("inspect", "[red]\x1b[31m.stl")
+    assert done.exit_code == 2
     assert r"[red]\x1b[31m.stl" in done.stderr
     assert "\x1b" not in done.stderr + done.stdout
 
