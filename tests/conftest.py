@@ -1,4 +1,4 @@
-"""What many tests share: one small model, and its kit, which is made once a session.
+"""What many tests share: one small model with its kit, and trees, each made once a session.
 
 Whoever changes a kit copies its folder. Imports stand inside the fixtures, since the tests of
 `hinges` also run where nothing else is installed.
@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterator
+import pickle
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +19,7 @@ import pytest
 
 if TYPE_CHECKING:
     from fabfold.kit.kit import Kit
+    from fabfold.tree.candidate import Candidate
 
 #: Length and thickness of the bar, in its own units: eight chunky voxels in a row.
 BAR = (80.0, 9.6, 9.6)
@@ -38,6 +42,17 @@ def _own_environment() -> Iterator[None]:
     if dict(os.environ) != before:
         os.environ.clear()
         os.environ.update(before)
+
+
+@contextmanager
+def _in_turn(factory: pytest.TempPathFactory, name: str) -> Iterator[Path]:
+    """A place that the processes of a session share; one at a time looks whether it is filled."""
+    # Each process has a folder of its own, all of them in one folder.
+    home = factory.getbasetemp()
+    home = home.parent if home.name.startswith("popen-") else home
+    with (home / f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield home / name
 
 
 @pytest.fixture(scope="session")
@@ -63,13 +78,31 @@ def bar_kit(
     """The bar's kit, exported; read only."""
     from fabfold.kit.kit import Kit
 
-    # The processes of one session have folders of their own in one folder, and share the kit.
-    home = tmp_path_factory.getbasetemp()
-    home = home.parent if home.name.startswith("popen-") else home
-    folder = home / "bar-kit"
-    with (home / "bar-kit.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with _in_turn(tmp_path_factory, "bar-kit") as folder:
         kit = Kit.from_model(bar, folder=folder, workers=1, **bar_options)
         if not (folder / "report.json").is_file():
             kit.export()
     return kit
+
+
+@pytest.fixture(scope="session")
+def searched(bar_kit: Kit) -> Callable[[Path], Path]:
+    """Begins a folder with the stages of the bar's kit, so that another kit need not search."""
+
+    def begin(folder: Path) -> Path:
+        assert bar_kit.folder is not None
+        shutil.copytree(bar_kit.folder / "stages", folder / "stages")
+        return folder
+
+    return begin
+
+
+@pytest.fixture(scope="session")
+def animal_trees(tmp_path_factory: pytest.TempPathFactory) -> list[Candidate]:
+    """Trees of an animal of many hinges, best first; read only."""
+    from tree_cases import searched_animal
+
+    with _in_turn(tmp_path_factory, "animal-trees") as path:
+        if not path.is_file():
+            path.write_bytes(pickle.dumps(searched_animal()))
+        return list(pickle.loads(path.read_bytes()))

@@ -81,6 +81,7 @@ def test_the_profile_chooses_and_the_recipe_may_say_otherwise():
         print_mode(PLA, clearance_mm=0.08)
 
 
+@pytest.mark.slow
 def test_bores_grip_and_slip_by_what_the_profile_says(made):
     tree, _, joinery, _ = made
     assert len(joinery.pins) == len(tree.hinges)
@@ -102,6 +103,7 @@ def test_bores_grip_and_slip_by_what_the_profile_says(made):
             assert gap == pytest.approx(wanted, abs=0.012)
 
 
+@pytest.mark.slow
 def test_a_web_with_a_hole_closes_the_far_end_and_the_way_in_is_free(made):
     _, _, joinery, kit = made
     import manifold3d
@@ -134,6 +136,7 @@ def _sides_of(step):
     return {*step.sides[0], *step.sides[1]}
 
 
+@pytest.mark.slow
 def test_the_path_is_proven_on_bodies_with_their_pins(made):
     tree, motion, joinery, _ = made
     proof = certify(
@@ -142,6 +145,7 @@ def test_the_path_is_proven_on_bodies_with_their_pins(made):
     assert FIT.min_gap_mm <= proof["min_gap_mm"] <= FIT.slip_mm
 
 
+@pytest.mark.slow
 def test_every_pin_is_put_in_once_and_parts_grow_together(made):
     tree, _, joinery, kit = made
     assert sorted(step.pin for step in kit.steps) == list(range(len(joinery.pins)))
@@ -154,6 +158,7 @@ def test_every_pin_is_put_in_once_and_parts_grow_together(made):
     assert together == {frozenset(range(len(tree.bodies)))}
 
 
+@pytest.mark.slow
 def test_the_replay_with_real_pins_agrees(made):
     tree, _, joinery, kit = made
     checks = {check.name: check for check in check_apart(joinery, kit)}
@@ -163,6 +168,7 @@ def test_the_replay_with_real_pins_agrees(made):
     assert checks["plates"].figure == 1
 
 
+@pytest.mark.slow
 def test_the_replay_finds_a_pin_from_the_closed_end_and_a_side_from_below(made):
     tree, _, joinery, kit = made
     bores = pin_bores(tree, joinery)
@@ -236,6 +242,7 @@ def test_poses_in_mm_carry_points_as_the_lattice_does(open_bodies):
             assert np.allclose(point, origin + 20.0 * there, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_bodies_lie_flat_inside_the_bed_and_apart(made):
     _, _, joinery, kit = made
     plates = kit.plates
@@ -257,6 +264,7 @@ def test_bodies_lie_flat_inside_the_bed_and_apart(made):
             assert apart >= 4.0 - 1e-6
 
 
+@pytest.mark.slow
 def test_a_small_bed_takes_more_plates_and_a_tiny_one_names_the_voxel_that_fits(made):
     tree, _, joinery, _ = made
     bores = pin_bores(tree, joinery)
@@ -272,11 +280,10 @@ def test_a_small_bed_takes_more_plates_and_a_tiny_one_names_the_voxel_that_fits(
 
 
 @pytest.fixture(scope="module")
-def kit_folder(bar_kit, bar, bar_options, tmp_path_factory):
+def kit_folder(searched, bar, bar_options, tmp_path_factory):
     """The bar's kit for a filament printer, exported."""
-    folder = tmp_path_factory.mktemp("apart") / "bar-kit"
+    folder = searched(tmp_path_factory.mktemp("apart") / "bar-kit")
     kit = Kit.from_model(bar, folder=folder, workers=1, profile="fdm-pla-0.4", **bar_options)
-    kit._results["fold"] = bar_kit.fold()
     kit.export()
     return kit, folder
 
@@ -352,6 +359,7 @@ def test_a_kit_comes_back_from_its_folder(kit_folder):
     assert again.joinery.face_gap_mm == 0.2
 
 
+@pytest.mark.slow
 def test_a_filament_printer_is_told_that_a_closed_kit_fuses(bar_kit):
     from fabfold.kit.checking import run_checks
 
@@ -444,6 +452,7 @@ def test_every_3mf_shows_a_picture(kit_folder):
         assert len(image.getcolors(256 * 256)) > 100
 
 
+@pytest.mark.slow
 def test_a_kit_that_does_not_go_together_fails_its_check_and_says_where(made):
     tree, _, joinery, kit = made
     bores = pin_bores(tree, joinery)
@@ -458,6 +467,7 @@ def test_a_kit_that_does_not_go_together_fails_its_check_and_says_where(made):
     assert "in the way of the pin" in pins.note
 
 
+@pytest.mark.slow
 def test_what_was_seen_comes_back_with_the_kit(kit_folder):
     built = kit_folder[0].join()
     again = load_built(kit_folder[0]._store, save_built(kit_folder[0]._store, built))

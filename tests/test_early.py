@@ -26,6 +26,7 @@ def found(bar_kit):
     return next(bar_kit._rounds().found())[0]
 
 
+@pytest.mark.slow
 def test_a_first_kit_has_bodies_and_the_proof(bar_kit, found, tmp_path):
     listener = Listener()
     with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), listener) as early:

@@ -41,6 +41,7 @@ def body(solid, name="body-00"):
     return BodyMesh(name, points, np.array(mesh.tri_verts, dtype=np.int32))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (31.0, 17.0, 8.0)])
 def test_a_hollow_is_a_chamber_where_the_ball_does_not_pass_its_hole(turn):
     (chamber,) = find_chambers([body(bored(1.6, turn=turn))], 2.0)
@@ -53,6 +54,7 @@ def test_a_hollow_is_a_chamber_where_the_ball_does_not_pass_its_hole(turn):
     assert find_chambers([body(bored(2.4, turn=turn))], 2.0) == []
 
 
+@pytest.mark.slow
 def test_two_narrow_holes_are_no_wide_one_and_a_bent_way_counts():
     assert len(find_chambers([body(bored(1.6, holes=2))], 2.0)) == 1
     bent = block((0, 0, 0), (24, 24, 24)) - block((6, 6, 6), (18, 18, 18))
@@ -69,6 +71,7 @@ def test_gaps_and_nooks_that_the_ball_does_not_fit_are_no_chambers():
     assert find_chambers([body(block((0, 0, 0), (24, 24, 24)))], 3.5) == []
 
 
+@pytest.mark.slow
 def test_thin_walls_keep_powder_in():
     can = block((0, 0, 0), (20, 20, 20)) - block((0.5, 0.5, 0.5), (19.5, 19.5, 19.5))
     assert len(find_chambers([body(can)], 2.0)) == 1
@@ -96,6 +99,7 @@ def _arrays(solid):
     return made.vertices, made.faces
 
 
+@pytest.mark.slow
 def test_chambers_between_parts_are_told_and_no_fault(tmp_path):
     cup = block((0, 0, 0), (24, 24, 20)) - block((4, 4, 4), (20, 20, 30))
     lid = block((0, 0, 20.5), (24, 24, 24))
@@ -108,6 +112,7 @@ def test_chambers_between_parts_are_told_and_no_fault(tmp_path):
     assert told == pytest.approx(16.0 * 16.0 * 16.5, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_kit_whose_body_is_hollow_fails():
     tree, joinery = row_tree(), row_joinery(row_tree(), bump=False)
     motion = row_motion(tree)

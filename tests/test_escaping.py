@@ -11,7 +11,7 @@ import zipfile
 from html.parser import HTMLParser
 
 import pytest
-from test_robust import fabfold
+from test_robust import command
 
 from fabfold.errors import harmless
 from fabfold.kit.kit import Kit, open_kit
@@ -24,12 +24,12 @@ PLAIN = "".join(c if c.isprintable() else "_" for c in NAME)
 
 
 @pytest.fixture(scope="module")
-def folder(bar, bar_options, tmp_path_factory):
+def folder(searched, bar, bar_options, tmp_path_factory):
     """The kit of a model with such a name."""
     home = tmp_path_factory.mktemp("named")
     model = home / f"{NAME}.stl"
     model.write_bytes(bar.read_bytes())
-    kit = Kit.from_model(model, folder=home / "kit", workers=1, **bar_options)
+    kit = Kit.from_model(model, folder=searched(home / "kit"), workers=1, **bar_options)
     kit.export()
     return kit.folder
 
@@ -94,10 +94,11 @@ def test_the_terminal_shows_commands_instead_of_obeying():
     assert harmless("ü漢 [red]") == "ü漢 [red]"
 
 
-def test_what_is_refused_is_shown_as_it_is(tmp_path):
+def test_what_is_refused_is_shown_as_it_is(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "[red]\x1b[31m.stl").write_bytes(b"nothing")
-    done = fabfold("inspect", "[red]\x1b[31m.stl", cwd=tmp_path)
-    assert done.returncode == 2
+    done = command("inspect", "[red]\x1b[31m.stl")
+    assert done.exit_code == 2
     assert r"[red]\x1b[31m.stl" in done.stderr
     assert "\x1b" not in done.stderr + done.stdout
 

@@ -55,6 +55,7 @@ def test_the_kit_itself_passes_every_check(strip):
     assert failed(checks_of(strip)) == set()
 
 
+@pytest.mark.slow
 def test_what_the_certificate_says_is_held_against_the_printer(strip):
     tight = replace(strip.planned, motion=certified(strip.planned.motion, gap=0.31, end=0.25))
     checks = checks_of(replace(strip, planned=tight))
@@ -64,6 +65,7 @@ def test_what_the_certificate_says_is_held_against_the_printer(strip):
     assert checks["end of the path is the box"].figure == 0.25
 
 
+@pytest.mark.slow
 def test_too_much_that_was_rounded_off_fails(strip):
     full = sum(body.volume for body in strip.joinery.bodies)
     rounded = replace(
@@ -81,6 +83,7 @@ def test_too_much_that_was_rounded_off_fails(strip):
     )
 
 
+@pytest.mark.slow
 def test_a_tree_that_goes_elsewhere_is_found_voxel_by_voxel(strip):
     tree = strip.planned.tree
     target = tree.target.copy()
@@ -92,6 +95,7 @@ def test_a_tree_that_goes_elsewhere_is_found_voxel_by_voxel(strip):
     assert check.figure == len(check_tree(wrong)) >= 1
 
 
+@pytest.mark.slow
 def test_a_post_in_the_way_is_met_on_the_path_and_in_the_box(strip):
     solids = solids_of(strip.joinery.bodies)
     hinge = strip.planned.tree.hinges[0]
@@ -133,6 +137,7 @@ def test_a_fold_through_the_other_body_is_felt_in_the_replay(strip):
     assert error.figure > 10.0
 
 
+@pytest.mark.slow
 def test_filament_is_refused_for_the_area_that_would_fuse(bar_kit):
     built = bar_kit.join()
     check = checks_of(built, print_mode(PLA, "in-place", pose="b"))["prints as it lies"]

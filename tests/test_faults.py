@@ -8,13 +8,13 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
-from test_robust import arguments_of, contents, fabfold
+from test_robust import arguments_of, command, contents, fabfold
 
 from fabfold.kit.kit import Kit, open_kit
 
@@ -46,8 +46,7 @@ def test_stage_files_that_are_damaged_are_made_again(
     shutil.copytree(bar_kit.folder, folder)
     for name in ("stages/fold.json", "stages/made-bodies.npz", "bar.3mf"):
         fault(folder / name)
-    kit = open_kit(str(folder))
-    kit.export()
+    open_kit(str(folder), workers=1).export()
     assert_same(folder, bar_kit.folder)
 
 
@@ -57,8 +56,8 @@ def test_a_kit_that_was_moved_goes_on(bar_kit: Kit, tmp_path: Path) -> None:
     (tmp_path / "one").rename(tmp_path / "far" / "away" / "two")
     folder = tmp_path / "far" / "away" / "two"
     (folder / "fold.glb").unlink()
-    done = fabfold("export", folder, "-q", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = command("export", folder, "-q")
+    assert done.exit_code == 0, done.stderr
     assert_same(folder, bar_kit.folder)
 
 
@@ -75,8 +74,8 @@ def test_a_clock_that_jumps_and_another_number_of_workers_do_not_matter(
 def test_two_runs_in_one_folder_do_not_mix(
     bar: Path, bar_options: dict[str, Any], bar_kit: Kit, tmp_path: Path
 ) -> None:
-    command = [
-        "export",
+    call = [
+        "fold",
         str(bar),
         "-o",
         str(tmp_path / "kit"),
@@ -85,18 +84,20 @@ def test_two_runs_in_one_folder_do_not_mix(
         *arguments_of(bar_options),
     ]
     first = subprocess.Popen(
-        [sys.executable, "-m", "fabfold", *command], stderr=subprocess.PIPE, encoding="utf-8"
+        [sys.executable, "-m", "fabfold", *call], stderr=subprocess.PIPE, encoding="utf-8"
     )
     while not (tmp_path / "kit" / "stages").is_dir():
         assert first.poll() is None, first.stderr.read()
         time.sleep(0.05)
-    second = fabfold(*command, cwd=tmp_path)
+    second = fabfold(*call, cwd=tmp_path)
     assert first.poll() is None, "the first run was over too soon for this test"
     assert second.returncode == 2
     assert "another run is at work in this folder" in second.stderr
     _, said = first.communicate()
     assert first.returncode == 0, said
-    assert_same(tmp_path / "kit", bar_kit.folder)
+    found, want = contents(tmp_path / "kit" / "stages"), contents(bar_kit.folder / "stages")
+    assert "fold.json" in found
+    assert [name for name in found if name != "journal.json" and found[name] != want[name]] == []
 
 
 @contextmanager
@@ -120,20 +121,28 @@ def small_disk(folder: Path, size: str) -> Iterator[None]:
 @pytest.mark.skipif(sys.platform != "linux" or os.getuid() != 0, reason="needs root on Linux")
 @pytest.mark.parametrize("share", [0.1, 0.9])
 def test_a_full_disk_is_told_and_made_good(
-    share: float, bar: Path, bar_options: dict[str, Any], bar_kit: Kit, tmp_path: Path
+    share: float,
+    bar: Path,
+    bar_options: dict[str, Any],
+    bar_kit: Kit,
+    searched: Callable[[Path], Path],
+    tmp_path: Path,
 ) -> None:
+    """It is full while the search writes its first files, or while the last ones are delivered."""
     disk = tmp_path / "disk"
-    command = ["export", str(bar), "-o", str(disk / "kit"), "-q", "-j", "1"]
+    call = ["export", str(bar), "-o", str(disk / "kit"), "-q", "-j", "1"]
     whole = sum(len(data) for data in contents(bar_kit.folder).values())
     with small_disk(disk, f"{int(share * whole / 1024)}k"):
-        done = fabfold(*command, *arguments_of(bar_options), cwd=tmp_path)
+        if share > 0.5:
+            searched(disk / "kit")
+        done = fabfold(*call, *arguments_of(bar_options), cwd=tmp_path)
         assert done.returncode == 2, done.stderr
         assert "the disk is full" in done.stderr
         assert len(done.stderr.strip().splitlines()) == 1, done.stderr
         assert not list(disk.rglob(".part-*"))
         subprocess.run(["mount", "-o", "remount,size=100m", str(disk)], check=True)
-        done = fabfold(*command, *arguments_of(bar_options), cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
+        done = command(*call, *arguments_of(bar_options))
+        assert done.exit_code == 0, done.stderr
         assert_same(disk / "kit", bar_kit.folder)
 
 
@@ -144,9 +153,9 @@ def test_a_place_that_can_only_be_read_is_told(bar: Path, bar_kit: Kit, tmp_path
         shutil.copytree(bar_kit.folder, disk / "kit")
         before = contents(disk)
         subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
-        done = fabfold("export", disk / "kit", "--voxel-mm", 30, "-q", cwd=tmp_path)
-        assert done.returncode == 2, done.stderr
+        done = command("export", disk / "kit", "--voxel-mm", 30, "-q")
+        assert done.exit_code == 2, done.stderr
         assert "can only be read" in done.stderr
-        done = fabfold("check", disk / "kit", cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
+        done = command("check", disk / "kit")
+        assert done.exit_code == 0, done.stderr
         assert contents(disk) == before

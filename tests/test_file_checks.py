@@ -107,6 +107,7 @@ def test_a_file_that_is_too_large_is_told_the_scale_that_fits(tmp_path):
     assert "scaled to 50 % it fits" in found.note
 
 
+@pytest.mark.slow
 def test_the_command_checks_any_file_and_speaks_json(tmp_path, bar_kit):
     path = written(tmp_path, cube((0, 0, 0), (20, 20, 0.4)))
     run = CliRunner().invoke

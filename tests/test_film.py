@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from PIL import Image
-from test_robust import fabfold
+from test_robust import command
 
 from fabfold.guide.film import film_frames
 from fabfold.guide.manual import plan_steps
@@ -35,12 +35,12 @@ def test_frames_go_through_all_steps_and_nothing_jumps(plan):
 def test_the_command_writes_what_its_ending_says(ending, bar_kit, plan, tmp_path):
     path = tmp_path / f"fold.{ending}"
     arguments = ("render", bar_kit.folder, "-o", path, "--size", "128x96", "-q")
-    done = fabfold(*arguments, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = command(*arguments)
+    assert done.exit_code == 0, done.stderr
     content = path.read_bytes()
     if ending == "mp4":
         assert content[4:8] == b"ftyp"
-        done = fabfold(*arguments, cwd=tmp_path)
+        command(*arguments)
         assert path.read_bytes() == content
     else:
         with Image.open(path) as image:
@@ -56,8 +56,9 @@ def test_the_command_writes_what_its_ending_says(ending, bar_kit, plan, tmp_path
     ("arguments", "words"),
     [(("-o", "fold.avi"), "mp4"), (("--size", "large"), "--size large"), (("--size", "8x8"), "64")],
 )
-def test_what_cannot_be_drawn_is_told(arguments, words, bar_kit, tmp_path):
-    done = fabfold("render", bar_kit.folder, "-q", *arguments, cwd=tmp_path)
-    assert done.returncode == 2
+def test_what_cannot_be_drawn_is_told(arguments, words, bar_kit, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = command("render", bar_kit.folder, "-q", *arguments)
+    assert done.exit_code == 2
     assert words in done.stderr
     assert list(tmp_path.iterdir()) == []

@@ -113,6 +113,7 @@ def test_order_of_hinges_in_the_file_does_not_matter():
     assert sample_path(turned, motion, meshes) == sample_path(tree, motion, meshes)
 
 
+@pytest.mark.slow
 def test_it_agrees_with_the_proof_on_printed_hinges():
     from fabfold.joinery.build import build_bodies
 

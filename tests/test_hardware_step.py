@@ -40,6 +40,7 @@ def assembled(tmp_path_factory):
 NAMES = ["pin-00", "pin-01", "screw-02", "magnet-00-north-out", "magnet-00-south-out"]
 
 
+@pytest.mark.slow
 def test_bodies_alone_are_in_the_one_file_and_all_parts_in_the_other(assembled):
     joinery, _, path, both = assembled
     bodies = [body.name for body in joinery.bodies]

@@ -41,6 +41,7 @@ def test_figures_are_those_of_the_file(tmp_path: Path) -> None:
     assert found["thin_share"] < 0.01
 
 
+@pytest.mark.slow
 def test_units_colours_and_objects(tmp_path: Path) -> None:
     red = np.full(12, 0x8000 | 31 << 10)
     red[:4] = 0x8000 | 31
@@ -72,6 +73,7 @@ def test_pieces_and_repairs_are_told(tmp_path: Path) -> None:
     assert found.volume == pytest.approx(8000.0)
 
 
+@pytest.mark.slow
 def test_thin_models_want_more_voxels(tmp_path: Path) -> None:
     cross = [trimesh.creation.box(size) for size in ((80, 8, 8), (8, 80, 8), (8, 8, 80))]
     path = tmp_path / "cross.stl"

@@ -270,6 +270,7 @@ def test_closed_hollows_are_filled():
     assert any("1 closed hollows filled, 216 mm³" in note for note in hollowed.notes)
 
 
+@pytest.mark.slow
 def test_same_input_gives_the_same_bytes(corner):
     tree, motion, joinery = corner
     voxels = voxels_of(tree.source, corner_solid())

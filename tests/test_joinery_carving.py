@@ -94,6 +94,7 @@ def test_volume_is_what_was_planned_and_the_clearance(slot):
     assert any("rounded off" in note and "2 cells" in note for note in joinery.notes)
 
 
+@pytest.mark.slow
 def test_no_hinge_is_cut(lid):
     tree, motion, voxels, joinery = lid
     still = replace(motion, angles_deg=motion.angles_deg[:1], moves=motion.moves[:1])

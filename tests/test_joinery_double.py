@@ -194,6 +194,7 @@ def test_both_axes_on_one_edge_where_they_fit():
         build(tree, 0.5)
 
 
+@pytest.mark.slow
 def test_quarter_turns_of_single_hinges():
     tree = hand_tree(
         [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1, ("S", (0,), (1,))), (1, 2, ("S", (3,), (1,)))]
@@ -267,6 +268,7 @@ def test_a_barrel_may_groove_a_link_but_not_cut_it(across, fate):
         assert tally.links_mm3 > 1.0
 
 
+@pytest.mark.slow
 def test_the_same_bytes_again():
     tree = hand_tree(*CHAINS["D beside S"])
     one, other = build(tree)[2], build(tree)[2]

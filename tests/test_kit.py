@@ -137,6 +137,7 @@ def test_interrupt_leaves_what_is_done_and_goes_on(bar, bar_options, tmp_path):
     assert (folder / "motion.json").is_file()
 
 
+@pytest.mark.slow
 def test_the_voxels_may_not_outnumber_the_template(bar):
     kit = Kit.from_model(bar, template="box-1x1x1", pitch=10.0)
     with pytest.raises(NoSolutionError, match=r"voxels|cells"):

@@ -86,10 +86,10 @@ def test_the_same_again_and_through_json(held, bar_kit):
 
 
 @pytest.mark.slow
-def test_a_kit_with_magnets_passes_and_counts_them(bar_kit, bar, bar_options, tmp_path):
-    kit = Kit.from_model(bar, folder=tmp_path / "kit", workers=1, retention="magnet", **bar_options)
-    kit._results["fold"] = bar_kit.fold()
-    folder = kit.export()
+def test_a_kit_with_magnets_passes_and_counts_them(searched, bar, bar_options, tmp_path):
+    folder = searched(tmp_path / "kit")
+    kit = Kit.from_model(bar, folder=folder, workers=1, retention="magnet", **bar_options)
+    kit.export()
     report = json.loads((folder / "report.json").read_text("utf-8"))
     assert report["verdict"] == "ok"
     data = json.loads((folder / "retention.json").read_text("utf-8"))

@@ -40,6 +40,7 @@ def in_own_axes(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return own - own.mean(axis=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
 @QUICK
 @given(axis=st.tuples(*[st.floats(-1, 1)] * 3), angle=st.floats(-180, 180), mirrored=st.booleans())

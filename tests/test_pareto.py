@@ -42,6 +42,7 @@ def test_nothing_beats_what_is_listed(wishes):
         assert [s.costs for s in listed] == sorted(best)
 
 
+@pytest.mark.slow
 def test_list_of_a_kit_and_going_on_with_one(tmp_path, monkeypatch):
     # The two ends of the ladder are enough.
     monkeypatch.setattr("fabfold.search.pareto.LADDER", (0.0, 1.0))

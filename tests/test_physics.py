@@ -9,12 +9,10 @@ from itertools import pairwise
 import joinery_models
 import numpy as np
 import pytest
-from tree_cases import animal
 
 from fabfold.cli.app import main
 from fabfold.errors import NoFoldError, RecipeError
 from fabfold.fold.core_sweep import CORE_HALF_SIDE
-from fabfold.fold.lattice_foldability import LatticeFoldability
 from fabfold.fold.lattice_planner import count_free_moves
 from fabfold.physics.actions import (
     Carve,
@@ -30,11 +28,7 @@ from fabfold.physics.actions import (
 from fabfold.physics.forced_path import physics_path
 from fabfold.physics.lattice_path import lattice_path, steps_of
 from fabfold.physics.unfolding import Unfolding, cell_boxes, repulsion
-from fabfold.tree.effort import Effort
-from fabfold.tree.solve import solve
 from fabfold.tree.system import hinge_system
-
-QUICK = Effort(polish_best=100, polish_each=60, starts=3, restarts=10)
 
 
 def strip():
@@ -208,12 +202,12 @@ def test_steps_are_counted_where_a_hinge_passes_the_middle():
 
 
 @pytest.fixture(scope="module")
-def dog():
+def dog(animal_trees):
     """A tree of many hinges whose moves get into each other's way."""
-    trees = solve(animal(46, "box-3x4x4", 8), 0, LatticeFoldability(), QUICK)
-    return trees[0]
+    return animal_trees[0]
 
 
+@pytest.mark.slow
 def test_steps_that_are_not_free_yet_wait(dog):
     """A motion in an order that cells do not allow is put right."""
     system = hinge_system(dog.tree)
@@ -231,6 +225,7 @@ def test_steps_that_are_not_free_yet_wait(dog):
     assert count_free_moves(system, path, carve=CORE_HALF_SIDE) == len(path)
 
 
+@pytest.mark.slow
 def test_an_animal_folds_by_forces(dog):
     found = physics_path(dog.tree)
     system = hinge_system(dog.tree)
@@ -275,6 +270,7 @@ def test_actions_come_back_from_their_file(tmp_path):
             read_actions(path)
 
 
+@pytest.mark.slow
 def test_the_command_folds_by_forces(bar, bar_kit, tmp_path, capsys):
     """A kit by forces has another path, keeps the actions, and goes on by its recipe alone."""
     import shutil
@@ -286,15 +282,15 @@ def test_the_command_folds_by_forces(bar, bar_kit, tmp_path, capsys):
     session = tmp_path / "session.json"
     found = physics_path(bar_kit.fold().tree)
     session.write_text(json.dumps(actions_json(found.actions)), encoding="utf-8")
-    assert _run(["fold", str(kit), "--actions", str(session), "-q"]) == 0
+    assert _run(["fold", str(kit), "--actions", str(session), "-q", "-j", "1"]) == 0
     session.unlink()
-    opened = open_kit(str(kit))
+    opened = open_kit(str(kit), workers=1)
     assert opened.recipe.method == "physics"
     assert opened.recipe.actions == "session.json"
     motion = opened.fold().motion
     assert [moving[0] for moving in motion.moves[1:]] == found.path[:, 0].tolist()
-    assert _run(["join", str(kit), "-q"]) == 0
-    built = open_kit(str(kit)).join()
+    assert _run(["join", str(kit), "-q", "-j", "1"]) == 0
+    built = open_kit(str(kit), workers=1).join()
     assert built.planned.motion.certificate["min_gap_mm"] > 0.4
     assert built.planned.motion.moves == motion.moves
     capsys.readouterr()

@@ -126,6 +126,7 @@ def test_fits_the_printer_is_about_the_pose(row):
     assert "the kit as the box" in box.note
 
 
+@pytest.mark.slow
 def test_checks_and_keys_follow_the_pose(bar_kit):
     built, recipe, template = bar_kit.join(), bar_kit.recipe, bar_kit.template
     box = print_mode(POWDER, "in-place", pose="b")
@@ -226,6 +227,7 @@ def test_prusaslicer_sees_one_object_of_named_coloured_parts(all_slicers, bar_ki
     assert settings["nozzle_diameter"].split(",") == ["0.4"] * len(names)
 
 
+@pytest.mark.slow
 def test_prusaslicer_3_reads_its_settings_by_the_application(all_slicers):
     application = _application(all_slicers / "bar-prusa3.3mf")
     name, _, version = application.partition("-")

@@ -65,6 +65,7 @@ def everything(apart):
     return held(apart, ALL)
 
 
+@pytest.mark.slow
 def test_hinges_that_move_get_pins_that_both_bodies_grip(apart, rubbing):
     tree, motion, before, _ = apart
     joinery, kit, retention = rubbing
@@ -87,6 +88,7 @@ def test_hinges_that_move_get_pins_that_both_bodies_grip(apart, rubbing):
         assert pin.tight == ((solid ^ lined).volume() > 0.95 * lined.volume())
 
 
+@pytest.mark.slow
 def test_a_lining_touches_nothing_but_its_pin(apart, rubbing):
     tree, motion, _, _ = apart
     joinery = rubbing[0]
@@ -98,6 +100,7 @@ def test_a_lining_touches_nothing_but_its_pin(apart, rubbing):
     assert proof["min_gap_mm"] >= PLA.apart.min_gap_mm
 
 
+@pytest.mark.slow
 def test_the_strain_is_what_the_material_bears_and_the_torque_follows(apart, rubbing):
     joinery, friction = rubbing[0], rubbing[2].friction
     assert friction.strain == 0.008
@@ -111,6 +114,7 @@ def test_the_strain_is_what_the_material_bears_and_the_torque_follows(apart, rub
     assert weight / 2 * 5 < friction.needed_nmm < weight * 60
 
 
+@pytest.mark.slow
 def test_magnets_hold_the_model_too_where_no_pocket_is(apart, everything):
     tree, motion, before, _ = apart
     joinery, _, retention = everything
@@ -137,6 +141,7 @@ def test_magnets_hold_the_model_too_where_no_pocket_is(apart, everything):
     assert lost == pytest.approx(each, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_an_enclosed_magnet_lies_below_a_skin_and_goes_in_from_above(apart, everything):
     joinery, kit, retention = everything
     poses = kit.plates.poses
@@ -170,6 +175,7 @@ def test_an_enclosed_magnet_lies_below_a_skin_and_goes_in_from_above(apart, ever
     assert upright
 
 
+@pytest.mark.slow
 def test_pauses_name_every_magnet_once_and_go_up(apart, everything):
     _, kit, retention = everything
     pauses = print_pauses(retention, kit)
@@ -199,11 +205,13 @@ def test_in_place_pauses_count_from_the_lowest_point_of_the_kit(bar_kit):
     assert sum(line.startswith("Pause at z = ") for line in told) == len(pauses)
 
 
+@pytest.mark.slow
 def test_retention_comes_back_from_json(everything):
     retention = everything[2]
     assert Retention.from_json(json.loads(json.dumps(retention.to_json()))) == retention
 
 
+@pytest.mark.slow
 def test_every_magnet_is_seen_in_a_picture(everything):
     joinery, _, retention = everything
     pictures = magnet_pictures(joinery, retention, np.eye(3))
@@ -243,6 +251,7 @@ def test_poles_are_turned_so_that_neighbours_do_not_repel():
     assert _with_poles(tree, motion, joinery, three, pocket)[1] == 2
 
 
+@pytest.mark.slow
 def test_the_box_stays_whole_with_everything_in_it(apart, everything):
     tree, motion, _, _ = apart
     joinery = everything[0]
@@ -273,12 +282,11 @@ def test_what_a_way_of_printing_cannot_hold_is_refused_with_a_remedy(options, to
 
 
 @pytest.mark.slow
-def test_a_kit_tells_its_pauses_and_what_friction_holds(bar_kit, bar, bar_options, tmp_path):
+def test_a_kit_tells_its_pauses_and_what_friction_holds(searched, bar, bar_options, tmp_path):
     kit = Kit.from_model(
-        bar, folder=tmp_path / "kit", workers=1, profile="fdm-pla-0.4",
+        bar, folder=searched(tmp_path / "kit"), workers=1, profile="fdm-pla-0.4",
         retention="magnet+friction", retention_in_a=True, magnet_fit="enclosed", **bar_options,
     )  # fmt: skip
-    kit._results["fold"] = bar_kit.fold()
     folder = kit.export()
     report = json.loads((folder / "report.json").read_text("utf-8"))
     assert report["verdict"] == "ok"
@@ -299,33 +307,36 @@ def test_a_kit_tells_its_pauses_and_what_friction_holds(bar_kit, bar, bar_option
     assert held["hinges held in the model"]["figure"] > 0
     rubbing = data["friction_pins"]
     assert ([] if rubbing is None else rubbing["hinges"]) == data["held_by_friction_only"]
-    assert open_kit(str(folder)).join().retention == kit.join().retention
+    assert open_kit(str(folder), workers=1).join().retention == kit.join().retention
 
 
 @pytest.mark.slow
 def test_a_certificate_names_the_friction_pins_that_it_leaves_out(
-    bar_kit, bar, bar_options, tmp_path
+    searched, bar, bar_options, tmp_path
 ):
     kit = Kit.from_model(
-        bar, folder=tmp_path / "kit", workers=1, profile="fdm-pla-0.4", retention="friction",
-        **bar_options,
+        bar, folder=searched(tmp_path / "kit"), workers=1, profile="fdm-pla-0.4",
+        retention="friction", **bar_options,
     )  # fmt: skip
-    kit._results["fold"] = bar_kit.fold()
     built = kit.join()
     names = [built.planned.tree.hinges[hinge].name for hinge in built.retention.friction.hinges]
     assert names
     assert all(name in built.planned.motion.certificate["geometry"] for name in names)
-    again = open_kit(str(tmp_path / "kit")).join()
+    again = open_kit(str(tmp_path / "kit"), workers=1).join()
     assert again.retention == built.retention
     assert [pin.tight for pin in again.joinery.pins] == [pin.tight for pin in built.joinery.pins]
 
 
 @pytest.mark.slow
-def test_blocks_are_a_kit_like_any_other(bar_kit, bar, bar_options, tmp_path):
+def test_blocks_are_a_kit_like_any_other(bar_kit, searched, bar, bar_options, tmp_path):
     kit = Kit.from_model(
-        bar, folder=tmp_path / "kit", workers=1, skin="lattice", retention="magnet", **bar_options
+        bar,
+        folder=searched(tmp_path / "kit"),
+        workers=1,
+        skin="lattice",
+        retention="magnet",
+        **bar_options,
     )
-    kit._results["fold"] = bar_kit.fold()
     folder = kit.export()
     report = json.loads((folder / "report.json").read_text("utf-8"))
     assert report["verdict"] == "ok"

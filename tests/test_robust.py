@@ -10,7 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from fabfold.cli.app import app
 from fabfold.errors import RecipeError, system_message
 from fabfold.kit.kit import open_kit
 from fabfold.version import __version__
@@ -32,6 +34,11 @@ def fabfold(*arguments, cwd):
     )
 
 
+def command(*arguments):
+    """The same command in this process, where it is not the process that matters."""
+    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+
+
 def contents(folder):
     return {
         str(path.relative_to(folder)): path.read_bytes()
@@ -50,8 +57,8 @@ def test_files_in_the_working_folder_are_not_executed(bar_options, tmp_path):
 
     for name in ("numpy", "random", "pickle", "types", "socket", "multiprocessing", "numba"):
         (tmp_path / f"{name}.py").write_text(TRAP)
-    bd.export_step(bd.Box(80, 9.6, 9.6), tmp_path / "part.step")
-    more = arguments_of(bar_options)
+    bd.export_step(bd.Box(40, 9.6, 9.6), tmp_path / "part.step")
+    more = arguments_of({**bar_options, "template": "box-2x2x1"})
     found = fabfold("export", "part.step", "-o", "kit", "-j", "2", *more, "-q", cwd=tmp_path)
     assert found.returncode == 0, found.stderr
     assert (tmp_path / "kit" / "report.json").is_file()
@@ -59,9 +66,10 @@ def test_files_in_the_working_folder_are_not_executed(bar_options, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_refused_model_changes_nothing(bar, bar_options, tmp_path):
+def test_a_refused_model_changes_nothing(bar_kit, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     kit = tmp_path / "kit"
-    open_kit(str(bar), folder=kit, **bar_options).run("voxelize")
+    shutil.copytree(bar_kit.folder, kit)
     before = contents(kit)
     (tmp_path / "empty.stl").write_bytes(b"")
     for source, more, code in (
@@ -71,11 +79,11 @@ def test_a_refused_model_changes_nothing(bar, bar_options, tmp_path):
         (kit, ["--voxel-mm", "3"], 2),
         (kit, ["--clearance-mm", "0.1"], 2),
     ):
-        result = fabfold("voxelize", source, "-o", kit, "-q", *more, cwd=tmp_path)
-        assert result.returncode == code, result.stderr
+        result = command("voxelize", source, "-o", kit, "-q", *more)
+        assert result.exit_code == code, result.stderr
         assert contents(kit) == before, (source, more)
-    fresh = fabfold("export", "empty.stl", "-q", cwd=tmp_path)
-    assert fresh.returncode == 2
+    fresh = command("export", "empty.stl", "-q")
+    assert fresh.exit_code == 2
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_dir()) == ["kit"]
 
 
@@ -121,7 +129,8 @@ def test_exporting_again_gives_the_same_bytes(bar_kit, tmp_path):
 
 
 @pytest.mark.slow
-def test_errors_of_the_file_system_are_one_sentence(bar, tmp_path):
+def test_errors_of_the_file_system_are_one_sentence(bar, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("")
     for arguments in (
         ("voxelize", "a" * 300 + ".stl"),
@@ -131,8 +140,8 @@ def test_errors_of_the_file_system_are_one_sentence(bar, tmp_path):
         ("calibrate", "--turns-freely", "0.3", "-o", tmp_path),
         ("coupon", "-o", "/proc/coupon.3mf"),
     ):
-        result = fabfold(*arguments, cwd=tmp_path)
-        assert result.returncode == 2, (arguments, result.stderr)
+        result = command(*arguments)
+        assert result.exit_code == 2, (arguments, result.stderr)
         assert "Traceback" not in result.stderr
         assert result.stderr.strip().splitlines()[-1].startswith("fabfold: ")
 
@@ -182,8 +191,8 @@ def test_a_damaged_journal_is_told(bar, bar_options, tmp_path):
     journal = kit / "stages" / "journal.json"
     whole = journal.read_text("utf-8")
     journal.write_text(whole[:200], "utf-8")
-    result = fabfold("voxelize", kit, "-q", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
+    result = command("voxelize", kit, "-q")
+    assert result.exit_code == 0, result.stderr
     assert "note: " in result.stdout
     assert "journal.json was damaged" in result.stdout
     assert json.loads(journal.read_text("utf-8")) == json.loads(whole)

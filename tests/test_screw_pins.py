@@ -46,6 +46,7 @@ def solid(joinery, body):
     return as_manifold(mesh.vertices, mesh.faces, mesh.name)
 
 
+@pytest.mark.slow
 def test_a_screw_clears_all_knuckles_but_the_last_and_bites_there(screwed):
     tree, _, joinery, _ = screwed
     assert len(joinery.pins) == len(tree.hinges)
@@ -68,6 +69,7 @@ def test_a_screw_clears_all_knuckles_but_the_last_and_bites_there(screwed):
         assert pin.thread_mm >= 2.0
 
 
+@pytest.mark.slow
 def test_heads_are_sunk_into_the_barrel_with_a_wall_around_them(screwed):
     tree, _, joinery, _ = screwed
     for bore, pin in zip(pin_bores(tree, joinery), joinery.pins, strict=True):
@@ -86,6 +88,7 @@ def test_heads_are_sunk_into_the_barrel_with_a_wall_around_them(screwed):
     assert wall[0].ok
 
 
+@pytest.mark.slow
 def test_screws_go_in_in_order_and_the_path_is_proven_with_them(screwed):
     tree, motion, joinery, kit = screwed
     assert (kit.replay.done, kit.replay.faults) == (len(joinery.pins), ())
@@ -98,6 +101,7 @@ def test_screws_go_in_in_order_and_the_path_is_proven_with_them(screwed):
     assert "in the way of the pin" in seen.faults[0]
 
 
+@pytest.mark.slow
 def test_bill_order_and_manual_name_the_screws(screwed):
     tree, _, joinery, kit = screwed
     count = len(joinery.pins)

@@ -36,6 +36,7 @@ def alone(problem):
     return search(problem, range(4), LatticeFoldability(), EFFORT, workers=1)
 
 
+@pytest.mark.slow
 def test_best_first_from_every_seed(alone):
     totals = [c.energy["total"] for c in alone]
     assert totals == sorted(totals)
@@ -97,6 +98,7 @@ def test_a_seed_that_raises_is_left_out_and_the_others_return(problem, alone):
         assert "ZeroDivisionError" in heard.done[1].why
 
 
+@pytest.mark.slow
 def test_where_every_seed_fails_it_is_said_and_not_taken_for_no_fold(problem):
     judge = Poisoned(own_question(problem, 7, (), EFFORT), exits=False)
     with pytest.raises(WorkerError, match="every seed failed"):

@@ -145,6 +145,7 @@ def test_one_of_several_objects_is_chosen(tmp_path: Path) -> None:
         ) else None
 
 
+@pytest.mark.slow
 def test_the_chosen_object_is_part_of_the_recipe(tmp_path: Path) -> None:
     parts = thing(1, mesh(), 'name="lid"') + thing(2, mesh(2, (50, 0, 0)), 'name="box"')
     path = write(tmp_path / "a.3mf", parts, ITEM(1, "") + ITEM(2, ""))

@@ -235,6 +235,7 @@ def test_pieces_that_stand_apart_say_by_how_much(tmp_path: Path) -> None:
         load_solid(path)
 
 
+@pytest.mark.slow
 def test_many_pieces_that_stand_apart_by_a_hair(tmp_path: Path) -> None:
     import trimesh
 

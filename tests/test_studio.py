@@ -433,6 +433,7 @@ def test_a_drag_pulls_and_is_recorded(kit):
         assert pushes[2].force == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_forces_from_the_page_make_the_kits_path(kit):
     with studio(kit) as opened:
         worked(opened)

@@ -7,7 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -55,24 +55,35 @@ def studio(bar_kit: Any, tmp_path: Any, browser: Any) -> Iterator[Any]:
         assert re.match(rf"(blob:)?(http|ws)://{re.escape(here)}/|data:", url), url
 
 
-def picture(page: Any) -> np.ndarray:
-    """What the scene shows: pixels left of the panel."""
+def picture(page: Any, until: Callable[[np.ndarray], bool]) -> np.ndarray:
+    """What the scene shows, pixels left of the panel, once that is so and it stands still."""
     import io
 
     from PIL import Image
 
     def shot() -> np.ndarray:
-        page.wait_for_timeout(1500)
         image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
         return np.asarray(image)[:, :920].astype(int)
 
-    # A busy machine draws late: the scene is there when it stands still.
-    before, now = shot(), shot()
-    for _ in range(20):
-        if np.array_equal(before, now):
+    # A busy machine draws late; what does not come at all is for the caller to say.
+    before = shot()
+    for _ in range(WAIT_MS // 250):
+        page.wait_for_timeout(250)
+        now = shot()
+        if np.array_equal(before, now) and until(now):
             break
-        before, now = now, shot()
+        before = now
     return now
+
+
+def changed(pixels: np.ndarray, before: np.ndarray) -> int:
+    """Pixels of clearly another colour."""
+    return int((np.abs(pixels - before).max(axis=2) > 40).sum())
+
+
+def is_drawn(pixels: np.ndarray) -> bool:
+    """Whether bodies are seen, and not the empty scene alone."""
+    return coloured(pixels) > 10_000
 
 
 def coloured(pixels: np.ndarray) -> int:
@@ -90,23 +101,24 @@ def tab(page: Any, name: str) -> None:
 
 def test_it_is_scrubbed_and_stepped_and_bodies_are_clicked(studio: Any) -> None:
     page, _, _ = studio
-    closed = picture(page)
-    assert coloured(closed) > 10_000
+    closed = picture(page, is_drawn)
+    assert is_drawn(closed)
     press(page, "B")
-    box = picture(page)
-    assert (np.abs(box - closed).max(axis=2) > 40).sum() > 5_000
+    box = picture(page, lambda now: changed(now, closed) > 5_000)
+    assert changed(box, closed) > 5_000
     press(page, "◀")
     assert page.get_by_text(re.compile(r"Move \d of \d")).is_visible()
     press(page, "A")
-    again = picture(page)
-    assert (np.abs(again - closed).max(axis=2) > 40).sum() < 500
+    again = picture(page, lambda now: changed(now, closed) < 500)
+    assert changed(again, closed) < 500
     # A click in the middle of the bar meets a body, and greys the others.
     rows, columns = np.nonzero(closed.max(axis=2) - closed.min(axis=2) > 40)
     page.mouse.click(int(np.median(columns)), int(np.median(rows)))
     page.get_by_text(re.compile(r"body-\d\d: \d voxels, voxel \d clicked")).wait_for(
         timeout=WAIT_MS
     )
-    assert coloured(picture(page)) < coloured(closed)
+    grey = picture(page, lambda now: coloured(now) < coloured(closed))
+    assert coloured(grey) < coloured(closed)
 
 
 def test_a_region_is_painted_and_undone(studio: Any) -> None:
@@ -152,7 +164,7 @@ def test_forces_fold_it_with_a_persons_help(studio: Any) -> None:
     press(page, "Begin")
     press(page, "Forces")
     page.get_by_text("0 actions; A and B are up to 180° apart").wait_for(timeout=WAIT_MS)
-    shown = picture(page)
+    shown = picture(page, lambda now: coloured(now) > 1_000)
     rows, columns = np.nonzero(shown.max(axis=2) - shown.min(axis=2) > 40)
     left = columns < np.median(columns)
     page.mouse.click(int(np.median(columns[left])), int(np.median(rows[left])))
@@ -171,7 +183,8 @@ def test_forces_fold_it_with_a_persons_help(studio: Any) -> None:
     press(page, "carve")
     press(page, "unfold")
     page.get_by_text("Unfolding: done.").wait_for(timeout=WAIT_MS)
-    assert (np.abs(picture(page) - shown).max(axis=2) > 40).sum() > 5_000
+    unfolded = picture(page, lambda now: changed(now, shown) > 5_000)
+    assert changed(unfolded, shown) > 5_000
     press(page, "Release pushes and pins")
     press(page, "match")
     page.get_by_text(re.compile(r"A and B have met")).wait_for(timeout=WAIT_MS)

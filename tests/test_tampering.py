@@ -114,6 +114,7 @@ def test_distances_of_meshes_are_exact() -> None:
     assert gap(box, turned.triangles) == pytest.approx(solids[0].min_gap(solids[1], 2), abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
 def test_every_change_of_a_hundred_is_found(bar_kit: Kit, tmp_path: Path, change: Change) -> None:
     assert bar_kit.folder is not None

@@ -7,19 +7,13 @@ from itertools import permutations
 import joinery_models
 import numpy as np
 import pytest
-from tree_cases import animal
 
 from fabfold.errors import CheckError
 from fabfold.fold.core_sweep import CORE_HALF_SIDE
-from fabfold.fold.lattice_foldability import LatticeFoldability
 from fabfold.fold.lattice_planner import count_free_moves
 from fabfold.fold.tidy import hinge_distances, tidied, walk
 from fabfold.proof.certify import certify, certify_orders
-from fabfold.tree.effort import Effort
-from fabfold.tree.solve import solve
 from fabfold.tree.system import hinge_system
-
-QUICK = Effort(polish_best=100, polish_each=60, starts=3, restarts=10)
 
 
 def test_distances_count_bodies_on_the_way():
@@ -31,14 +25,10 @@ def test_distances_count_bodies_on_the_way():
     assert walk(np.array([[0, 1], [3, 1], [1, 1]]), distances) == 2 + 3
 
 
-@pytest.fixture(scope="module")
-def trees():
-    return solve(animal(46, "box-3x4x4", 8), 0, LatticeFoldability(), QUICK)
-
-
-def test_a_tidy_path_walks_less_and_stays_free(trees):
+@pytest.mark.slow
+def test_a_tidy_path_walks_less_and_stays_free(animal_trees):
     gained = 0
-    for candidate in trees:
+    for candidate in animal_trees:
         system = hinge_system(candidate.tree)
         distances = hinge_distances(system.parent)
         found = tidied(system, candidate.path)
@@ -122,6 +112,7 @@ def _prove_each(tree, path, meshes):
         certify(tree, _partial(tree, path), meshes, 10.0, (0, 0, 0), 0.2)
 
 
+@pytest.mark.slow
 def test_every_order_of_a_kits_groups_is_certified(bar_kit):
     built = bar_kit.join()
     tree, motion, joinery = built.planned.tree, built.planned.motion, built.joinery

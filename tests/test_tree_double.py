@@ -192,6 +192,7 @@ def test_a_strip_without_single_hinges_folds_by_double_ones(tree):
     assert max(path_overlap(hinge_system(made), tree.path)) <= TOUCH
 
 
+@pytest.mark.slow
 def test_trees_with_links_survive_their_file(tree):
     made = tree.tree
     again = FoldTree.from_json(made.to_json(20.0, (0.0, 0.0, 0.0)))
@@ -201,6 +202,7 @@ def test_trees_with_links_survive_their_file(tree):
         assert np.array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_the_checker_sees_what_is_wrong_with_a_link(tree):
     made = tree.tree
     number = next(i for i, edge in enumerate(made.edges) if edge.kind == "D")

@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from tree_cases import animal, solid_problem, strip
+from tree_cases import QUICK, animal, large_animal, solid_problem, strip
 
 from fabfold.errors import NoFoldError, NoTreeError
 from fabfold.fold.lattice_foldability import LatticeFoldability
@@ -14,8 +14,6 @@ from fabfold.tree.initial_poses import grow
 from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.solve import solve
 from fabfold.tree.system import hinge_system
-
-QUICK = Effort(polish_best=100, polish_each=60, starts=3, restarts=10)
 
 
 def energies(candidates):
@@ -97,6 +95,7 @@ def test_pairs_that_cannot_be_rigid_turn_or_part():
         assert check_tree(candidate.tree) == []
 
 
+@pytest.mark.slow
 def test_surface_decides_which_way_a_strip_folds():
     depth = np.full((4, 6), 0.1)
     # The +y faces are hollow: better inside the folded box than outside.
@@ -108,19 +107,14 @@ def test_surface_decides_which_way_a_strip_folds():
 
 @pytest.fixture(scope="module")
 def dog():
-    return animal(46, "box-3x4x4", 8)
-
-
-@pytest.fixture(scope="module")
-def dog_trees(dog):
-    return solve(dog, 0, LatticeFoldability(), QUICK)
+    return large_animal()
 
 
 @pytest.mark.slow
-def test_an_animal_folds(dog_trees):
-    assert dog_trees
-    assert energies(dog_trees) == sorted(energies(dog_trees))
-    for candidate in dog_trees:
+def test_an_animal_folds(animal_trees):
+    assert animal_trees
+    assert energies(animal_trees) == sorted(energies(animal_trees))
+    for candidate in animal_trees:
         assert check_tree(candidate.tree) == []
         system = hinge_system(candidate.tree)
         turned = np.zeros(len(system.turns), dtype=int)
@@ -130,19 +124,19 @@ def test_an_animal_folds(dog_trees):
 
 
 @pytest.mark.slow
-def test_candidates_differ(dog_trees):
-    hinges = [{(h.point, h.angle_deg) for h in c.tree.hinges} for c in dog_trees]
+def test_candidates_differ(animal_trees):
+    hinges = [{(h.point, h.angle_deg) for h in c.tree.hinges} for c in animal_trees]
     for i, one in enumerate(hinges):
         assert all(one != other for other in hinges[:i])
 
 
 @pytest.mark.slow
-def test_same_seed_same_trees_also_through_pickle(dog, dog_trees):
+def test_same_seed_same_trees_also_through_pickle(dog, animal_trees):
     again = solve(pickle.loads(pickle.dumps(dog)), 0, LatticeFoldability(), QUICK)
     assert [c.tree.to_json(1.0, (0.0, 0.0, 0.0)) for c in again] == [
-        c.tree.to_json(1.0, (0.0, 0.0, 0.0)) for c in dog_trees
+        c.tree.to_json(1.0, (0.0, 0.0, 0.0)) for c in animal_trees
     ]
-    assert all((a.path == b.path).all() for a, b in zip(again, dog_trees, strict=True))
+    assert all((a.path == b.path).all() for a, b in zip(again, animal_trees, strict=True))
 
 
 def test_seeds_differ(dog):

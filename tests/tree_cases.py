@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from fabfold.fold.lattice_foldability import LatticeFoldability
 from fabfold.lattice.rotations import FACES, parity
 from fabfold.lattice.shipped import load_template
 from fabfold.recipe.recipe_wishes import default_weights
+from fabfold.tree.effort import Effort
 from fabfold.tree.problem import TreeProblem, tree_problem
+from fabfold.tree.solve import solve
+
+#: Less than `fabfold` ever spends on a seed.
+QUICK = Effort(polish_best=100, polish_each=60, starts=3, restarts=10)
 
 
 def face_pairs(cells):
@@ -75,4 +81,23 @@ def animal(count, template, seed, printable=0.85):
     )
 
 
-__all__ = ["TreeProblem", "animal", "face_pairs", "solid_problem", "strip"]
+def large_animal():
+    """The animal whose trees the tests share."""
+    return animal(46, "box-3x4x4", 8)
+
+
+def searched_animal():
+    """Its trees, best first, as one seed finds them."""
+    return solve(large_animal(), 0, LatticeFoldability(), QUICK)
+
+
+__all__ = [
+    "QUICK",
+    "TreeProblem",
+    "animal",
+    "face_pairs",
+    "large_animal",
+    "searched_animal",
+    "solid_problem",
+    "strip",
+]

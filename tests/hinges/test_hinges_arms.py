@@ -51,6 +51,7 @@ def bodies(hinge: SingleHinge, parent_thick: float, child_thick: float, long: fl
     return Pos(-aside, -below) * parent, lid.rotate(Axis.Z, hinge.spec.angle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "leaf",
     [
@@ -80,6 +81,7 @@ def test_the_gap_is_the_clearance_at_every_angle(leaf):
         assert exact(shape, half).volume == pytest.approx(mesh_of(shape).volume(), rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("angle", "step"), [(0.0, 26.0), (180.0, 26.0), (70.0, -10.0)])
 def test_a_box_and_a_lower_lid_print_in_place(angle, step):
     hinge = SingleHinge(40, clearance=0.3, leaf=Arm.pair(step), angle=angle)
@@ -97,6 +99,7 @@ def test_a_box_and_a_lower_lid_print_in_place(angle, step):
     assert pytest.approx(0.5 * step - 0.15, abs=1e-6) == (box & over).bounding_box().max.Y
 
 
+@pytest.mark.slow
 def test_the_fit_looks_at_bodies_on_arms():
     hinge = SingleHinge(40, clearance=0.3, leaf=Arm.pair(10.0))
     box, lid = bodies(hinge, 20.0, 10.0)
@@ -108,6 +111,7 @@ def test_the_fit_looks_at_bodies_on_arms():
         hinge.fit(box, bodies(hinge, 20.0, 10.0, long=30)[1])
 
 
+@pytest.mark.slow
 def test_what_reaches_below_a_thin_body_is_trimmed():
     hinge = SingleHinge(40, clearance=0.3, leaf=Arm())
     box, lid = bodies(hinge, 20.0, 4.0)
@@ -129,6 +133,7 @@ def test_as_meshes():
         double_hinge_meshes(20, 0.3, leaf=Arm())
 
 
+@pytest.mark.slow
 def test_a_loose_pin_and_play():
     hinge = SingleHinge(60, knuckles=5, pin=FilamentPin(), clearance=0.3, leaf=Arm.pair(12.0))
     assert play(hinge).radial == pytest.approx(0.2)
@@ -138,6 +143,7 @@ def test_a_loose_pin_and_play():
     assert pytest.approx(60) == hardware.bounding_box().size.Z
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own", [0, 1])
 def test_on_an_edge_of_either_body(own):
     hinge = SingleHinge.along(
@@ -164,6 +170,7 @@ def test_on_an_edge_of_either_body(own):
         hinge.fit(box, lid, edge=edge)
 
 
+@pytest.mark.slow
 def test_a_lid_that_opens_by_270_degrees():
     arms = (Arm(offset=4.0, **FLAT), Arm(**FLAT))
     hinge = SingleHinge(40, clearance=0.3, leaf=arms, opens=270, closed=180)
@@ -182,6 +189,7 @@ def test_a_lid_that_opens_by_270_degrees():
         hinge.fit(*bodies(hinge, 30.0, 5.0))
 
 
+@pytest.mark.slow
 def test_two_plates_with_the_axis_in_their_middle_turn_to_both_sides():
     # flush with barrels as thick as the plates
     flush = Arm(offset=5.0, rise=-2.15, angle=90.0, clear_top=True)
@@ -286,6 +294,7 @@ def test_the_outline_is_what_was_asked_for():
     assert rounded - plain - in_wall == pytest.approx(0.17886 * 4.0, rel=0.01)
 
 
+@pytest.mark.slow
 @needs_cadquery
 def test_in_cadquery():
     import cadquery as cq

@@ -114,6 +114,7 @@ def lidded(cq):
     return box, lid.edges("<Y and >Z").hingeChild(outwards=(0, 0, 1), clearance=0.3)
 
 
+@pytest.mark.slow
 def test_a_hinge_lies_along_an_edge(cq, plugin):
     from build123d import Box, Pos
 

@@ -24,6 +24,7 @@ def upper_edge(body, towards: Axis):
     return body.edges().group_by(Axis.Z)[-1].sort_by(towards)[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own", ["parent", "child"])
 def test_bodies_side_by_side(own: str):
     box, lid = beside()
@@ -42,6 +43,7 @@ def test_bodies_side_by_side(own: str):
     assert pytest.approx(18.3 + 36) == other.bounding_box().max.Z
 
 
+@pytest.mark.slow
 def test_a_lid_on_its_box_opens_at_the_back():
     box, lid = Box(60, 40, 30), Pos(0, 0, 15.3 + 10) * Box(60, 40, 20)
     edge = upper_edge(box, Axis.Y)
@@ -55,6 +57,7 @@ def test_a_lid_on_its_box_opens_at_the_back():
     assert pytest.approx(15.0 - 20.0, abs=0.01) == other.bounding_box().min.Z
 
 
+@pytest.mark.slow
 def test_bodies_anywhere_and_turned():
     place = Location((10, 20, 30), (40, 50, 60))
     box, lid = beside()
@@ -94,6 +97,7 @@ def test_a_lid_opens_by_an_angle(closed: float, limits, lower: bool, upper: bool
     assert (spec.stops.lower, spec.stops.upper) == (lower, upper)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [0, 180])
 def test_a_lid_stops_where_it_should(closed: float):
     box, lid = (Pos(0, side * 20, 0) * Box(40, 39.7, 36) for side in (-1, 1))

@@ -173,6 +173,7 @@ def test_the_part_refuses_as_the_plan_does():
         SingleHinge(20, knuckles=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCREWS)
 @pytest.mark.parametrize(("end", "sunk"), [("nut", False), ("tap", True)])
 def test_a_hinge_on_every_screw_turns_with_its_gaps(name, end, sunk):

@@ -44,6 +44,7 @@ def tray() -> FoldedSheet:
     return FoldedSheet.tray(60, 50, 25, use="few")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [
@@ -155,6 +156,7 @@ def test_seams_keep_half_a_clearance_off_their_plane(tray):
     assert reach(tray) == pytest.approx(25.0 - 0.5 * 0.3 * 2**0.5)
 
 
+@pytest.mark.slow
 def test_snaps_stand_where_they_are_wanted():
     sheet = FoldedSheet(PLATE, [MIDDLE], use="few", places=(0.2, 0.8))
     posts = [one for one in sheet.flat.faces() if abs(one.center().Z - 5.0) < 4.0]
@@ -276,6 +278,7 @@ def test_nonsense_is_refused_in_a_sentence(make, words):
         make()
 
 
+@pytest.mark.slow
 def test_panels_that_overlap_when_folded_are_refused():
     cross = Box(120, 36, 2, align=LYING) + Box(36, 120, 2, align=LYING)
     for x in (-1, 1):

@@ -68,6 +68,7 @@ def test_one_page_of_the_same_bytes_every_time(tmp_path):
     assert pages[0].read_bytes().count(b"/Type /Page\n") == 1
 
 
+@pytest.mark.slow
 def test_the_page_of_a_whole_coupon_is_one(tmp_path):
     _, page = write_coupon(tmp_path / "whole.stl", title="Hinge coupon, fdm-pla-0.4")
     assert page.read_bytes().count(b"/Type /Page\n") == 1

@@ -119,6 +119,7 @@ def volume_shared(one: typing.Any, other: typing.Any) -> float:
     return float(sum(solid.volume for solid in solids))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0, 50])
 @pytest.mark.parametrize("size", ["M2", "M3"])
 @pytest.mark.parametrize("knuckles", [2, 3])

@@ -22,6 +22,7 @@ def pair(length: float = 40, wide: float = 30, thick: float = 20, gap: float = 0
     return made
 
 
+@pytest.mark.slow
 def test_sound_bodies_turn_with_their_gap():
     hinge = SingleHinge(40, clearance=0.3)
     parent, child = hinge.fit(*pair())
@@ -37,6 +38,7 @@ def test_sound_bodies_turn_with_their_gap():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [30, 110, 180])
 def test_bodies_drawn_at_any_angle(angle: float):
     hinge = SingleHinge(40, clearance=0.3, angle=angle)
@@ -51,6 +53,7 @@ def test_bodies_the_wrong_way_round():
         SingleHinge(40, clearance=0.3).fit(child, parent)
 
 
+@pytest.mark.slow
 def test_a_body_above_the_axis():
     parent, child = pair()
     with pytest.raises(HingeError, match=r"overlap by .* the child reaches 3.85 mm outwards"):
@@ -65,6 +68,7 @@ def test_a_hinge_longer_than_its_edge():
         SingleHinge(60, clearance=0.3).fit(*pair(length=40))
 
 
+@pytest.mark.slow
 def test_bodies_that_touch_print_in_one_piece():
     flush = [Pos(side * 15, -10, 0) * Box(30, 20, 40) for side in (-1, 1)]
     with pytest.raises(HingeError, match=r"0 mm apart and print in one piece: keep each"):
@@ -77,6 +81,7 @@ def outside(part: Part, bounds: Part) -> float:
     return float(sum(solid.volume for solid in solids))
 
 
+@pytest.mark.slow
 def test_no_fin_stands_out_of_a_thin_lid():
     """The bracket is 4 mm deep, the lid 2: what is not barrel stays within the lid."""
     hinge = SingleHinge(40, clearance=0.3, radius=2.5)
@@ -90,6 +95,7 @@ def test_no_fin_stands_out_of_a_thin_lid():
     assert len(fitted.solids()) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wall", [1.2, 2.0])
 @pytest.mark.parametrize("gusset", [False, True])
 def test_no_wedge_stands_out_of_a_wall(wall: float, gusset: bool):
@@ -101,6 +107,7 @@ def test_no_wedge_stands_out_of_a_wall(wall: float, gusset: bool):
     assert outside(fitted, room + bd.Cylinder(hinge.spec.radius + 0.02, 100)) < 1e-3
 
 
+@pytest.mark.slow
 def test_a_bracket_may_fill_a_hollow():
     """Behind a thin wall the gusset stays: it is what carries the knuckles there."""
     hinge = SingleHinge(40, clearance=0.3, leaf=Bracket(gusset=True))
@@ -114,6 +121,7 @@ def test_a_bracket_may_fill_a_hollow():
     assert plain.volume > fitted.volume
 
 
+@pytest.mark.slow
 def test_builders_are_bodies_and_two_solids_are_none():
     parent, child = pair()
     with BuildPart() as built:
@@ -127,6 +135,7 @@ def test_builders_are_bodies_and_two_solids_are_none():
         SingleHinge(40, clearance=0.3).fit(parent, 3)
 
 
+@pytest.mark.slow
 def test_fit_works_where_bodies_stand():
     parent, child = pair()
     place = Location((10, 20, 30), (40, 50, 60))
@@ -135,6 +144,7 @@ def test_fit_works_where_bodies_stand():
     assert hinge.sweep(parent, child, range(0, 181, 30)).gap == pytest.approx(0.3, abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_lid_on_a_box_by_its_edge():
     box, lid = Pos(0, -15, 0) * Box(40, 29.7, 20), Pos(0, 15, 0) * Box(40, 29.7, 20)
     hinge = SingleHinge(40, clearance=0.3)
@@ -143,6 +153,7 @@ def test_a_lid_on_a_box_by_its_edge():
     assert hinge.sweep(box, lid).worst.overlap == 0.0
 
 
+@pytest.mark.slow
 def test_doubles_look_at_the_edge_and_at_solids():
     size, hinge = 20.0, DoubleHinge(20, clearance=0.3)
     box = Box(size - 0.3, size - 0.3, size - 0.3)

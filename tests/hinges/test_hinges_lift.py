@@ -31,6 +31,7 @@ def bodies(plan: SinglePlan):
 LEAVES = [Bracket(), Leaf(14.0), Arm(), Arm.pair(14.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("leaf", LEAVES, ids=["bracket", "leaf", "arm", "pair"])
 @pytest.mark.parametrize("at", [None, (60.0, 150.0)])
 def test_the_child_comes_off_where_it_shall_and_nowhere_else(leaf, at):
@@ -91,6 +92,7 @@ def test_exact_halves_and_play():
     assert "LiftPin(radius=1.5" in repr(hinge)
 
 
+@pytest.mark.slow
 def test_a_lid_lifts_off_its_box():
     hinge = SingleHinge(40, knuckles=2, clearance=0.3, pin=LiftPin(1.5, at=110.0))
     parent, child = (Pos(side * 10.075, -10.075) * Box(19.85, 19.85, 40) for side in (-1, 1))

@@ -383,6 +383,7 @@ def test_a_flat_leaf_has_its_feet_on_the_bed():
     assert standing > 30 * 10
 
 
+@pytest.mark.slow
 def test_flat_brackets_lie_in_plates():
     hinge = SingleHinge(30, clearance=0.3, radius=3, leaf=Bracket(flat=True))
     low = -3 * 0.5**0.5
@@ -415,6 +416,7 @@ def test_the_hinge_moves_with_a_location():
     assert pytest.approx(hinge.center().X + 5) == moved.center().X
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.5, 2.0])
 def test_knuckles_of_the_child_may_be_longer_or_shorter(ratio):
     hinge = SingleHinge(40, knuckles=5, ratio=ratio, clearance=0.3)

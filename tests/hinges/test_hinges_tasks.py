@@ -139,6 +139,7 @@ def test_a_hinge_of_eight_mm_for_eyeglasses():
         assert parent.bounding_box().size.Z <= 8.0 + 1e-6
 
 
+@pytest.mark.slow
 def test_a_cabinet_hinge_with_holes_for_screws():
     leaf = Leaf(25, 3, holes=3, hole=4, sink=8)
     hinge = SingleHinge(60, clearance=0.4, leaf=leaf, pin=RodPin(3))
@@ -217,6 +218,7 @@ def test_an_assembly_of_cadquery_closes_by_constraints():
     assert box.val().distance(closed) == pytest.approx(0.3, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_hinge_in_inches():
     hinge = SingleHinge("2 in", clearance="12 thou", pin=ScrewPin("#6"), leaf=Leaf(19, 3))
     parent, child = hinge.parent_half, hinge.child_half
@@ -262,6 +264,7 @@ def test_a_lid_snaps_shut_on_its_arc():
         SnapTongue(replace(spec, catch=0.4))
 
 
+@pytest.mark.slow
 def test_a_screw_with_a_sunk_nut():
     hinge = SingleHinge(
         40, clearance=0.3, pin=ScrewPin("M3", end="nut", sunk=True), leaf=Leaf(16, 3)
@@ -329,6 +332,7 @@ def read_3mf(path):
     return m3.Manifold.compose(made)
 
 
+@pytest.mark.slow
 def test_files_of_a_box_and_its_lid(boxes, tmp_path):
     box, lid, place = boxes
     hinge = SingleHinge(60, knuckles=5, clearance=0.3, leaf=Bracket(gusset=True))
@@ -385,6 +389,7 @@ def test_mirrored_copied_and_pickled_hinges_are_as_good():
         assert gap(parent, turned(parent, child, 110)) == pytest.approx(0.0, abs=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bore", ["teardrop", "octagon"])
 def test_a_bore_that_lies_as_it_prints(bore):
     leaf, pin = Leaf(16, 2, flat=True), FilamentPin(2.85)
