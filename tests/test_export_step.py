@@ -20,6 +20,7 @@ from fabfold.export.step import write_step
 from fabfold.export.steptext import _string
 from fabfold.export.surfaces import Axis, Plane, Round, flat_regions, round_regions
 from fabfold.export.thin import thinned
+from fabfold.export.weld import without_needles
 from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.meshes import is_closed, mesh_volume
 
@@ -116,7 +117,7 @@ def test_a_body_that_the_kernel_refuses_is_written_flat(tmp_path, monkeypatch):
 
     monkeypatch.setattr(step, "_measured", strict)
     facts = write_step(tmp_path / "row.step", joinery, tree)
-    assert len(refused) == 1
+    assert len(refused) == 2  # thinned and not
     assert facts.plain == ("body-01",)
     solids = _read(tmp_path / "row.step").solids()
     assert all(_valid(solid) for solid in solids)
@@ -245,3 +246,22 @@ def test_thinned_gives_back_what_it_cannot_thin():
     vertices, faces = _mesh(m3.Manifold.cube((1, 1, 1)))
     points, triangles = thinned(vertices, faces, np.ones(12, dtype=bool), 0.1)
     assert points is vertices and triangles is faces
+
+
+def test_an_edge_of_one_last_digit_is_joined_and_longer_ones_stay():
+    vertices, faces = _mesh(m3.Manifold.cube((1, 1, 1)))
+    a, b, c = faces[0].tolist()
+    (d,) = set(next(f for f in faces.tolist() if b in f and a in f and c not in f)) - {a, b}
+    p, q = len(vertices), len(vertices) + 1
+    middle = (vertices[a] + vertices[b]) / 2
+    for length in (4e-6, 4e-3):
+        points = np.vstack([vertices, middle, middle + length * (vertices[b] - vertices[a])])
+        others = [f for f in faces.tolist() if not (a in f and b in f)]
+        split = [[a, p, c], [p, q, c], [q, b, c], [b, q, d], [q, p, d], [p, a, d]]
+        mesh = np.array(others + split)
+        assert is_closed(mesh)
+        joined, triangles = without_needles(points, mesh, 2e-5)
+        gone = 2 if length < 2e-5 else 0
+        assert len(triangles) == len(mesh) - gone and is_closed(triangles)
+        assert len(joined) == len(points) - gone // 2
+        assert mesh_volume(joined, triangles) == pytest.approx(1.0, abs=1e-12)

@@ -29,7 +29,7 @@ from fabfold.export.surfaces import (
     sculpted_triangles,
 )
 from fabfold.export.thin import thinned
-from fabfold.export.weld import weld_rounded
+from fabfold.export.weld import weld_rounded, without_needles
 from fabfold.files import write_text
 from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.meshes import mesh_volume
@@ -40,9 +40,12 @@ __all__ = ["StepFacts", "write_step"]
 
 #: A solid's volume may differ from its mesh's by this share before it is written again.
 VOLUME_SHARE = 0.01
+#: Shorter edges are the last digits of single precision, which the CAD kernel cannot take.
+_SHORTEST_MM = 2e-5
 #: Sculpted surfaces may be thinned to within this share of the voxel side.
 THIN_SHARE = 0.003
-_LEVELS = ("round", "flat", "triangles")
+#: What is tried in turn: thinned surfaces may cross themselves, round faces may be refused.
+_LEVELS = ("round, thinned", "round", "flat", "triangles")
 
 
 @dataclass(frozen=True)
@@ -168,7 +171,7 @@ def write_step(
         brep, level, measured = _sound_brep(body, axes[index], thin_mm, application)
         solids.append(StepSolid(body.name, brep, (red, green, blue)))
         volume += measured
-        if level != _LEVELS[0]:
+        if not level.startswith("round"):
             plain.append(body.name)
     title = title or path.stem
     write_text(path, step_text(solids, title, application))
@@ -213,7 +216,7 @@ def _sound_brep(
 
 
 def _brep(body: BodyMesh, axes: list[Axis], level: str, thin_mm: float) -> Brep:
-    vertices, faces = body.vertices, body.faces
+    vertices, faces = without_needles(body.vertices, body.faces, _SHORTEST_MM)
     if level == "triangles":
         points, faces = weld_rounded(vertices, faces)
         vertices = points.astype(np.float64)
@@ -229,12 +232,12 @@ def _brep(body: BodyMesh, axes: list[Axis], level: str, thin_mm: float) -> Brep:
             )
         return brep_of(vertices, faces, labels, surfaces)
     labels, planes = flat_regions(vertices, faces)
-    if thin_mm > 0:
+    if thin_mm > 0 and level.endswith("thinned"):
         sculpted = sculpted_triangles(vertices, faces, labels, planes, axes)
         vertices, faces = thinned(vertices, faces, sculpted, thin_mm)
         labels, planes = flat_regions(vertices, faces)
     surfaces = list(planes)
-    if level == "round":
+    if level.startswith("round"):
         labels, surfaces = round_regions(vertices, faces, labels, planes, axes)
     return brep_of(vertices, faces, labels, surfaces)
 

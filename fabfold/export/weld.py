@@ -18,7 +18,7 @@ from fabfold.joinery.bodies import BodyMesh
 from fabfold.meshes import compact, is_closed, mesh_volume, weld
 from fabfold.solid.convert import to_manifold, to_mesh
 
-__all__ = ["printable_mesh", "weld_rounded"]
+__all__ = ["printable_mesh", "weld_rounded", "without_needles"]
 
 #: Edges shorter than these are collapsed, in mm, until the rounded mesh is closed.
 _TOLERANCES_MM = (0.0, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
@@ -49,6 +49,46 @@ def weld_rounded(
     rounded = (exact if decimals is None else np.round(exact, decimals)).astype(np.float32)
     points, triangles = compact(*weld(rounded, faces, order="use"))
     return points, triangles.astype(np.int32)
+
+
+def without_needles(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], shortest: float
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Join the ends of very short edges, and drop the triangles that collapse.
+
+    Booleans in single precision leave edges of one last digit, which no CAD kernel takes.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+        Of a closed mesh, in mm.
+    faces : (f, 3) int32 array
+        Three vertex indices for each triangle.
+    shortest : float
+        Shortest edge that stays, in mm.
+
+    Returns
+    -------
+    vertices : (w, 3) float64 array
+        In mm, in order of first use.
+    faces : (g, 3) integer array
+        Triangles with three different corners; the mesh as it was given where joining would leave
+        it open.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    short = ends[np.linalg.norm(vertices[ends[:, 0]] - vertices[ends[:, 1]], axis=1) < shortest]
+    if len(short) == 0:
+        return vertices, faces
+    links = coo_array((np.ones(len(short), np.int8), short.T), shape=(len(vertices),) * 2)
+    _, group = connected_components(links, directed=False)
+    _, first = np.unique(group, return_index=True)
+    joined, triangles = compact(*weld(vertices[first[group]], faces, order="use"))
+    if not is_closed(triangles):
+        return vertices, faces
+    return joined, triangles.astype(np.int32)
 
 
 def printable_mesh(
