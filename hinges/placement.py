@@ -335,8 +335,8 @@ class PlacedPart(_Stored, BasePartObject):  # type: ignore[misc]
         return copied
 
     def _like(self, made: Part) -> Part:
-        """Another part of the same hinge, drawn in its frame, laid where this one lies."""
-        return (made.mirror(Plane.XY) if self.flipped else made).moved(self.place)
+        """Lay another part of the same hinge, just made in its frame, where this one lies."""
+        return (made.mirror(Plane.XY) if self.flipped else made).move(self.place)
 
     def _apply_transform(self, transformation: Any) -> PlacedPart:
         moved: PlacedPart = super()._apply_transform(transformation)
