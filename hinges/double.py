@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from functools import lru_cache
 from typing import Literal
 
@@ -267,7 +266,7 @@ class DoubleHinge(PlacedPart):
         loose = self.plan.loose
         if not loose:
             return None
-        return self._like(deepcopy(one_part([build_shape(shape) for shape in loose])))
+        return self._like(one_part([build_shape(shape) for shape in loose]))
 
     def fit(
         self,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from copy import deepcopy
 from functools import lru_cache
 from typing import Literal, Unpack
 
@@ -280,7 +279,7 @@ class SingleHinge(PlacedPart):
         loose = self.plan.loose
         if not loose:
             return None
-        drawn = self._like(deepcopy(one_part([build_shape(shape) for shape in loose])))
+        drawn = self._like(one_part([build_shape(shape) for shape in loose]))
         drawn.label = "hardware"
         return drawn
 
