@@ -1,20 +1,17 @@
-"""Exact solids of planned shapes, built with build123d's own interface only."""
+"""Exact solids of planned shapes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import lru_cache
-from typing import TYPE_CHECKING
+from functools import lru_cache, partial
 
+import build123d as bd
+
+from .blank import rim
 from .exceptions import HingeError
-from .shapes import Bored, Bounds, HalfPlan, Moved, Prism, Shape, Turned, bounds
-
-if TYPE_CHECKING:
-    import build123d as bd
-
-#: Boxes that share less than this, in mm, only touch.
-_TOUCH = 1e-6
+from .kernel_calls import across_axis, arced, cut, fused, through_axis
+from .shapes import Blank, Bored, HalfPlan, Moved, Prism, Shape, Turned, bounds, meet
 
 __all__ = ["build_all", "build_half", "build_shape", "laid", "one_part", "solids_of"]
 
@@ -32,8 +29,6 @@ def build_shape(shape: Shape) -> bd.Solid:
     Solid
         The exact solid in mm.
     """
-    import build123d as bd
-
     if isinstance(shape, Moved):
         frame = bd.Plane(origin=shape.origin, x_dir=shape.x_dir, z_dir=shape.z_dir)
         return laid(build_shape(shape.shape), frame.location)
@@ -56,8 +51,6 @@ def laid(solid: bd.Solid, place: bd.Location) -> bd.Solid:
     Solid
         The solid in its new place; it shares its surfaces with the other one.
     """
-    import build123d as bd
-
     return bd.Solid(solid.wrapped.Moved(place.wrapped))
 
 
@@ -65,6 +58,8 @@ def _shifted(shape: Shape, by: float) -> Shape:
     """A shape moved along z; equal knuckles that begin at 0 are the same to the last bit."""
     if isinstance(shape, Bored):
         return Bored(_shifted(shape.shape, by), tuple(_shifted(cut, by) for cut in shape.cuts))
+    if isinstance(shape, Blank):
+        return Blank(replace(shape.web, start=0.0, end=round(shape.web.end + by, 9)), shape.radius)
     if isinstance(shape, Prism):
         low, high = round(shape.start + by, 9), round(shape.end + by, 9)
         return Prism(shape.outline, low, high, shape.holes)
@@ -78,26 +73,19 @@ def _shifted(shape: Shape, by: float) -> Shape:
 @lru_cache(maxsize=256)
 def _at_nought(shape: Shape) -> bd.Solid:
     """Build a shape that begins at z = 0; knuckles of one row are mostly equal."""
-    import build123d as bd
-
     if isinstance(shape, Moved):
         return build_shape(shape)
     if isinstance(shape, Bored):
-        (whole,) = solids_of(_at_nought(shape.shape).cut(*map(build_shape, shape.cuts)))
+        (whole,) = cut([_at_nought(shape.shape)], map(build_shape, shape.cuts), joined=True)
         return whole
+    if isinstance(shape, Blank):
+        web = shape.web
+        face = arced(rim(shape), shape.radius, web.start)
+        return bd.Solid.extrude(face, bd.Vector(0, 0, web.end - web.start))
     if isinstance(shape, Prism):
-        corners = set(shape.outline)
-        (west, east), (south, north), _ = bounds(shape)
-        if corners == {(x, y) for x in (west, east) for y in (south, north)} and not shape.holes:
-            frame = bd.Plane(origin=(west, south, shape.start))
-            return bd.Solid.make_box(east - west, north - south, shape.end - shape.start, frame)
-        rim, *inner = (
-            bd.Wire.make_polygon([(x, y, shape.start) for x, y in outline], close=True)
-            for outline in (shape.outline, *shape.holes)
-        )
-        return bd.Solid.extrude(bd.Face(rim, inner), bd.Vector(0, 0, shape.end - shape.start))
-    rim = bd.Wire.make_polygon([(r, 0, z) for r, z in shape.outline], close=True)
-    turned = bd.Solid.revolve(bd.Face(rim), shape.turn, bd.Axis.Z)
+        face = across_axis((shape.outline, *shape.holes), shape.start)
+        return bd.Solid.extrude(face, bd.Vector(0, 0, shape.end - shape.start))
+    turned = bd.Solid.revolve(through_axis(shape.outline), shape.turn, bd.Axis.Z)
     return turned.rotate(bd.Axis.Z, shape.begin) if shape.begin else turned
 
 
@@ -132,8 +120,6 @@ def one_part(solids: Sequence[bd.Solid]) -> bd.Part:
     Part
         A part that holds them.
     """
-    import build123d as bd
-
     return bd.Part(list(solids))
 
 
@@ -153,7 +139,7 @@ def build_all(shapes: Sequence[Shape]) -> bd.Part:
     built = [build_shape(shape) for shape in shapes]
     if len(built) < 2:
         return one_part(built)
-    return one_part(solids_of(built[0].fuse(*built[1:])))
+    return one_part(fused(built, joined=True))
 
 
 def build_half(plan: HalfPlan, name: str) -> bd.Part:
@@ -176,8 +162,8 @@ def build_half(plan: HalfPlan, name: str) -> bd.Part:
     HingeError
         If the kernel returned anything else.
     """
-    for glued in (True, False) if plan.seat else (False,):
-        pieces = _half(plan, glued=glued)
+    for way in _ways(plan):
+        pieces = way(plan)
         if len(pieces) == 1 and _valid(pieces[0]):
             return one_part(pieces)
     raise HingeError(
@@ -186,37 +172,48 @@ def build_half(plan: HalfPlan, name: str) -> bd.Part:
     )
 
 
-def _half(plan: HalfPlan, *, glued: bool) -> list[bd.Solid]:
-    """Build a half from its shapes, whatever comes out.
+def _ways(plan: HalfPlan) -> list[Callable[[HalfPlan], list[bd.Solid]]]:
+    """How a half can be built, the fastest way first."""
+    ways = [_notched] if plan.blank else []
+    return [*ways, partial(_welded, glued=True), _welded] if plan.seat else [*ways, _welded]
+
+
+def _notched(plan: HalfPlan) -> list[bd.Solid]:
+    """Cut a half from its blank, whatever comes out: one operation, of surfaces that cross."""
+    assert plan.blank is not None
+    cuts = (*plan.notches, *plan.bore)
+    # Turned notches are clear of one another and leave no two faces side by side in one surface.
+    joined = not all(_is_turned(shape) for shape in cuts)
+    return cut([build_shape(plan.blank)], map(build_shape, cuts), joined=joined)
+
+
+def _is_turned(shape: Shape) -> bool:
+    """Whether a shape was turned, wherever it lies."""
+    return isinstance(shape.shape if isinstance(shape, Moved) else shape, Turned)
+
+
+def _welded(plan: HalfPlan, *, glued: bool = False) -> list[bd.Solid]:
+    """Build a half from its shapes, whatever comes out; the last step joins its faces.
 
     Glued, the webs are cut so that they only touch their knuckles: surfaces that touch need not be
     intersected, which is twice as fast.
     """
-    import build123d as bd
-
     added = [build_shape(shape) for shape in plan.add]
-    webs = [build_shape(shape) for shape in plan.web]
+    pieces = [build_shape(shape) for shape in plan.web]
     room = [bounds(shape) for shape in plan.web]
     cuts = [
         build_shape(shape)
         for shape in (plan.seat if glued else plan.carve)
-        if any(_meet(bounds(shape), each) for each in room)
+        if any(meet(bounds(shape), each) for each in room)
     ]
-    with bd.SkipClean():  # The last step joins faces that lie in one surface.
-        body = webs[0].fuse(*webs[1:]) if len(webs) > 1 else webs[0]
-        pieces = solids_of(body.cut(*cuts) if cuts else body)
-    if not plan.bore:
-        return solids_of(pieces[0].fuse(*pieces[1:], *added, glue=glued))
-    with bd.SkipClean():
-        solids = solids_of(pieces[0].fuse(*pieces[1:], *added, glue=glued))
-    return solids[1:] + solids_of(solids[0].cut(*(build_shape(shape) for shape in plan.bore)))
-
-
-def _meet(one: Bounds, other: Bounds) -> bool:
-    """Whether two boxes share room."""
-    return all(
-        a0 < b1 - _TOUCH and b0 < a1 - _TOUCH for (a0, a1), (b0, b1) in zip(one, other, strict=True)
-    )
+    if len(pieces) > 1:
+        pieces = fused(pieces, joined=False)
+    if cuts:
+        pieces = cut(pieces, cuts, joined=False)
+    solids = fused([*pieces, *added], glued=glued, joined=not plan.bore)
+    if not plan.bore or not solids:
+        return solids
+    return solids[1:] + cut(solids[:1], map(build_shape, plan.bore), joined=True)
 
 
 def _valid(solid: bd.Solid) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextvars import Context
+from copy import deepcopy
 from typing import Any, TypeVar
 
 from build123d import (
@@ -257,18 +258,20 @@ class PlacedPart(_Stored, BasePartObject):  # type: ignore[misc]
         align: Align | tuple[Align, Align, Align] | None,
         mode: Mode,
     ) -> None:
+        # build123d up to 0.12 lays the part while it is made, later ones after that.
+        at_once = not hasattr(BasePartObject, "_publish_to_context")
+        builder = BuildPart._get_context(self, log=False) if at_once else None
+        if builder is not None:  # Its boolean writes into what it joins; equal hinges share solids.
+            part = deepcopy(part)
         super().__init__(part=part, rotation=rotation, align=align, mode=mode)
         self.flipped = False
         self._bound: list[tuple[str, Location, tuple[float, float] | None]] = []
-        places, builder = [self.location], None
-        if not hasattr(BasePartObject, "_publish_to_context"):
-            # build123d up to 0.12 lays the part while it is made, later ones after that.
-            builder = BuildPart._get_context(self, log=False)
-            if builder is not None:
-                places = [
-                    location * self.rotation * part.location
-                    for location in LocationList._get_context().locations
-                ]
+        places = [self.location]
+        if builder is not None:
+            places = [
+                location * self.rotation * part.location
+                for location in LocationList._get_context().locations
+            ]
         self._lay(places, builder if mode == Mode.ADD else None)
 
     def _publish_to_context(self, scope: Any) -> None:
@@ -335,8 +338,8 @@ class PlacedPart(_Stored, BasePartObject):  # type: ignore[misc]
         return copied
 
     def _like(self, made: Part) -> Part:
-        """Another part of the same hinge, drawn in its frame, laid where this one lies."""
-        return (made.mirror(Plane.XY) if self.flipped else made).moved(self.place)
+        """Lay another part of the same hinge, just made in its frame, where this one lies."""
+        return (made.mirror(Plane.XY) if self.flipped else made).move(self.place)
 
     def _apply_transform(self, transformation: Any) -> PlacedPart:
         moved: PlacedPart = super()._apply_transform(transformation)

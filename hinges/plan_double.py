@@ -7,8 +7,8 @@ its direction from the middle of the face: "+y", "-y", "+z" or "-z".
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from math import sqrt
 from typing import Final, Unpack
 
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .barrel import BarrelSpec, barrel_spec, check_gap
+from .blank import cut_from_blank
 from .clearance import Clearance, millimetres
 from .exceptions import HingeError
 from .fit import at_least
@@ -439,7 +440,9 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
         near = 0.5 * spec.plate + spec.clearance.radial
         width = _width(spec)
         depth = width if spec.bracket.depth is None else spec.bracket.depth
-        web = box(-width, -near, -depth, -_block_top(spec, axis), layout.start, layout.end)
+        side = -1.0 if axis == index else 1.0  # the other way round on one common edge
+        west, east = sorted((side * width, side * near))
+        web = box(west, east, -depth, -_block_top(spec, axis), layout.start, layout.end)
         barrels = spec.pin.knuckles(layout, spec.chamfer, spec.bore_form)
         carve: list[Shape] = [
             placed(rows, shape) for shape in spec.pin.insertion_cuts(layout, edge)
@@ -453,14 +456,17 @@ def plan_double(spec: DoubleSpec) -> DoublePlan:
         carve += in_way
         if spec.turns[axis] > 180.0:
             carve += [placed(_about(frame, spec.turns[axis]), shape) for shape in in_way]
-        bodies.append(
-            HalfPlan(
-                (row(index, owner, core), *carve),
-                (placed(frame, web),),
-                tuple(placed(rows, shape) for who, shape in barrels if who == owner),
-                seat=() if spec.chamfer else (row(index, owner, spec.radius), *carve),
-            )
+        own = tuple(shape for who, shape in barrels if who == owner)
+        body = HalfPlan(
+            (row(index, owner, core), *carve),
+            (placed(rows, web),),
+            tuple(placed(rows, shape) for shape in own),
         )
+        if not spec.chamfer:
+            seat = groove(layout, owner, spec.radius)
+            blank, cut = cut_from_blank((web,), own, seat, carve, partial(placed, rows))
+            body = replace(body, seat=(placed(rows, seat), *carve), blank=blank, notches=cut)
+        bodies.append(body)
     in_link = [(spec.frame(index), layout) for index, layout in enumerate(layouts)]
     link = HalfPlan(
         tuple(row(index, 1, core) for index in range(len(layouts))),

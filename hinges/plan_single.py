@@ -12,6 +12,7 @@ from typing import Unpack
 from .arm import Arm, Mount
 from .arm_room import check_arms
 from .barrel import BarrelSpec, barrel_spec, check_gap
+from .blank import cut_from_blank
 from .clearance import millimetres
 from .exceptions import FitError, HingeError
 from .fit import at_least, at_most
@@ -249,16 +250,19 @@ def plan_single(spec: SingleSpec) -> SinglePlan:
     halves = []
     for owner, (side, mount) in enumerate(zip((-1.0, 1.0), spec.mounts, strict=True)):
         room = (*access, *(shape for who, shape in travel if who == owner))
-        overlapped = spec.chamfer or travel or (bumps and not owner)
-        halves.append(
-            HalfPlan(
-                (groove(layout, owner, core), *room),
-                (*mount.web(layout, spec.gap, side), *(lugs if owner else ())),
-                (*(shape for who, shape in barrels if who == owner), *(() if owner else bumps)),
-                (*mount.hole_cuts(layout, spec.gap, side), *(dimples if owner else ())),
-                () if overlapped else (groove(layout, owner, spec.radius), *room),
-            )
+        web = (*mount.web(layout, spec.gap, side), *(lugs if owner else ()))
+        add = (*(shape for who, shape in barrels if who == owner), *(() if owner else bumps))
+        half = HalfPlan(
+            (groove(layout, owner, core), *room),
+            web,
+            add,
+            (*mount.hole_cuts(layout, spec.gap, side), *(dimples if owner else ())),
         )
+        if not (spec.chamfer or travel or (bumps and not owner)):
+            row = groove(layout, owner, spec.radius)
+            blank, cut = cut_from_blank(web, add, row, room)
+            half = replace(half, seat=(row, *room), blank=blank, notches=cut)
+        halves.append(half)
     return SinglePlan(
         spec, layout, core, halves[0], halves[1], spec.pin.hardware(layout, spec.bore_form)
     )

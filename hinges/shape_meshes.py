@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .shapes import Bored, HalfPlan, Moved, Prism, Shape
+from .shapes import Blank, Bored, HalfPlan, Moved, Prism, Shape, cylinder
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -68,6 +68,10 @@ def manifold_of(shape: Shape, segments: int, *, outside: bool) -> Manifold:
         cuts = [manifold_of(cut, segments, outside=not outside) for cut in shape.cuts]
         whole = manifold_of(shape.shape, segments, outside=outside)
         return Manifold.batch_boolean([whole, *cuts], OpType.Subtract)
+    if isinstance(shape, Blank):
+        bar = cylinder(shape.radius, shape.web.start, shape.web.end)
+        web, round_bar = (manifold_of(part, segments, outside=outside) for part in (shape.web, bar))
+        return web + round_bar
     if isinstance(shape, Prism):
         rims = [list(shape.outline), *(list(hole) for hole in shape.holes)]
         section = CrossSection(rims, FillRule.EvenOdd)

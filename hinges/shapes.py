@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import cos, radians, sin
 
 __all__ = [
+    "Blank",
     "Bored",
     "Bounds",
     "HalfPlan",
@@ -17,12 +18,15 @@ __all__ = [
     "bounds",
     "box",
     "cylinder",
+    "meet",
     "regular",
     "teardrop",
 ]
 
 Point = tuple[float, float]
 Vector = tuple[float, float, float]
+#: Boxes that share less than this, in mm, only touch.
+_TOUCH = 1e-6
 #: Lowest and highest x, y and z in mm.
 Bounds = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
@@ -106,7 +110,23 @@ class Bored:
     cuts: tuple[Shape, ...]
 
 
-Shape = Turned | Prism | Moved | Bored
+@dataclass(frozen=True)
+class Blank:
+    """A prism united with a round bar about the z axis, as long as itself.
+
+    Attributes
+    ----------
+    web : Prism
+        The prism, without holes; its outline meets the circle of the bar twice.
+    radius : float
+        Radius of the bar in mm.
+    """
+
+    web: Prism
+    radius: float
+
+
+Shape = Turned | Prism | Moved | Bored | Blank
 
 
 @dataclass(frozen=True)
@@ -127,6 +147,10 @@ class HalfPlan:
         `carve` with the outline of the half's own knuckles where it has a core inside of them, so
         that ``web - seat`` only touches what is added, and ``(web - seat) + add`` is the same half.
         Empty where something that is added reaches into the web or into a knuckle.
+    blank : Shape or None
+        Web and barrel in one piece, where ``blank - notches - bore`` is the same half.
+    notches : tuple of Shape
+        What is cut from the blank.
     """
 
     carve: tuple[Shape, ...]
@@ -134,6 +158,8 @@ class HalfPlan:
     add: tuple[Shape, ...]
     bore: tuple[Shape, ...] = ()
     seat: tuple[Shape, ...] = ()
+    blank: Shape | None = None
+    notches: tuple[Shape, ...] = ()
 
 
 def bounds(shape: Shape) -> Bounds:
@@ -156,6 +182,10 @@ def bounds(shape: Shape) -> Bounds:
     if isinstance(shape, Prism):
         xs, ys = zip(*shape.outline, strict=True)
         return (min(xs), max(xs)), (min(ys), max(ys)), (shape.start, shape.end)
+    if isinstance(shape, Blank):
+        (west, east), (south, north), ends = bounds(shape.web)
+        wide = shape.radius
+        return (min(west, -wide), max(east, wide)), (min(south, -wide), max(north, wide)), ends
     inner = bounds(shape.shape)
     if isinstance(shape, Bored):
         return inner
@@ -165,6 +195,24 @@ def bounds(shape: Shape) -> Bounds:
         reach = [sorted((t * a, t * b)) for t, (a, b) in zip(turn, inner, strict=True)]
         made.append((origin + sum(r[0] for r in reach), origin + sum(r[1] for r in reach)))
     return made[0], made[1], made[2]
+
+
+def meet(one: Bounds, other: Bounds) -> bool:
+    """Tell whether two boxes share room.
+
+    Parameters
+    ----------
+    one, other : Bounds
+        The boxes in mm.
+
+    Returns
+    -------
+    bool
+        False where they only touch.
+    """
+    return all(
+        a0 < b1 - _TOUCH and b0 < a1 - _TOUCH for (a0, a1), (b0, b1) in zip(one, other, strict=True)
+    )
 
 
 def cylinder(radius: float, start: float, end: float) -> Turned:
