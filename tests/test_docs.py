@@ -53,7 +53,14 @@ def test_the_code_of_a_page_runs(page, bar, bar_kit, tmp_path, monkeypatch):
     exec(compile(code, page, "exec"), {"__name__": "__main__"})
 
 
-@pytest.mark.parametrize("path", WITH_EXAMPLES, ids=lambda path: str(path.relative_to(HOME)))
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=[pytest.mark.slow] * (path.stem == "cadquery"))
+        for path in WITH_EXAMPLES
+    ],
+    ids=lambda path: str(path.relative_to(HOME)),
+)
 def test_the_examples_of_a_module_are_right(path):
     parts = path.relative_to(HOME).with_suffix("").parts
     module = importlib.import_module(".".join(part for part in parts if part != "__init__"))

@@ -56,7 +56,8 @@ def states(motion: Motion, steps: int):
             yield (1.0 - share) * start + share * end
 
 
-@pytest.mark.parametrize("case", [pytest.param("strip8", marks=pytest.mark.slow), "corner"])
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["strip8", "corner"])
 def test_gap_is_the_clearance_in_every_pose(case, request):
     tree, motion, joinery = request.getfixturevalue(case)
     for angles in states(motion, 4):

@@ -218,6 +218,7 @@ def test_a_search_that_is_stopped_leaves_its_best(kit):
         assert opened.steps.kit().fold().tree.energy["total"] <= tree.energy["total"] + 1e-9
 
 
+@pytest.mark.slow
 def test_forces_of_a_session_are_kept_and_undone(kit):
     steps = StudioSteps(set_up_project(str(kit), None, {}))
     before = steps.kit().fold().motion

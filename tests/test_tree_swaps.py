@@ -18,7 +18,10 @@ from fabfold.tree.swept_cells import hinge_tables
 ANYWHERE = np.empty(0, np.int32)
 
 
-@pytest.mark.parametrize(("joints", "phases", "turns"), [("S", 48, 1), ("S+D", 4, 12)])
+@pytest.mark.parametrize(
+    ("joints", "phases", "turns"),
+    [("S", 48, 1), pytest.param("S+D", 4, 12, marks=pytest.mark.slow)],
+)
 def test_joints_keep_the_phase(joints, phases, turns):
     labels = phase_labels(joint_types(joints))
     assert sorted(np.unique(labels)) == list(range(phases))

@@ -117,6 +117,7 @@ def annotations_of(keywords):
     return found
 
 
+@pytest.mark.slow
 def test_the_proven_recipe_on_exact_solids():
     hinge = SingleHinge(20, radius=2.5, pin=ConePin(1.5), clearance=0.3)
     parent, child = hinge.parent_half, hinge.child_half
