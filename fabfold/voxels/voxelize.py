@@ -112,11 +112,11 @@ def voxelize(
     Returns
     -------
     list of Voxels
-        Different ones, best first: rated best; most total fill, less 0.5 a sliver, less lost
-        material. The
-        counts of both checkerboard colours fit the template, and the voxels hang together through
-        printed contacts. Of four, three leave a part of the template free, each more than the one
-        before, see :func:`fill_shares`; not where `pitch` or `origin` is given.
+        Different ones, best first: rated best; of equals those of most total fill, less 0.5 a
+        sliver, less lost material. The counts of both checkerboard colours fit the template, and
+        the voxels hang together through printed contacts. Of four, three leave a part of the
+        template free, each more than the one before, see :func:`fill_shares`; not where `pitch` or
+        `origin` is given.
 
     Raises
     ------
