@@ -26,12 +26,11 @@ from fabfold.tree.bound import closed_share
 from fabfold.tree.candidate import Candidate
 from fabfold.tree.effort import Effort
 from fabfold.voxels.voxel_model import Voxels
+from fabfold.voxels.voxelize import LARGE
 from fabfold.wishes.wish_list import Wishes
 
 __all__ = ["Found", "Rounds"]
 
-#: Templates of more cells are large: near misses are locked by more than corners.
-LARGE = 72
 #: Distance of the search's first seeds for recipe seeds that follow each other: more than
 #: any recipe's rounds use, so that two recipes share none.
 SEED_STRIDE = 1_000_000

@@ -16,6 +16,7 @@ from fabfold.tree.problem import from_features
 from fabfold.tree.template_parts import restrict_to_parts
 from fabfold.voxels.features import features
 from fabfold.voxels.voxel_model import Voxels
+from fabfold.voxels.voxelize import paying_sizes
 from fabfold.wishes.protect import rank_by_cuts, rigid_pairs
 from fabfold.wishes.wish_list import Wishes
 
@@ -82,8 +83,6 @@ def usable(options: Sequence[Voxels], template: Template, wishes: Wishes) -> lis
 
 #: Voxelizations whose numbers of voxels differ by no more than this are of one size.
 _ALIKE = 2
-#: Sizes, the fullest ones, that are tried before the others.
-_FULLEST = 2
 
 
 class VoxelizationProblems:
@@ -164,8 +163,8 @@ class VoxelizationProblems:
     def closing_order(self) -> list[int]:
         """Voxelizations by how closed the box could be; with --protect by cuts.
 
-        Of the two fullest sizes the best comes first, then the second of both: they close the box
-        better, where anything folds on them. Then come the other sizes in the same way.
+        Of the two sizes that pay (:func:`fabfold.voxels.voxelize.paying_sizes`) the best comes
+        first, then the second of both. Then come the other sizes in the same way.
         """
         if self._closing is None:
             order = list(range(len(self.options)))
@@ -177,7 +176,8 @@ class VoxelizationProblems:
                 turn: dict[int, int] = {}
                 for place, option in enumerate(order):
                     turn[option] = sum(rank[k] == rank[option] for k in order[:place])
-                order.sort(key=lambda k: (rank[k] >= _FULLEST, turn[k]))
+                paying = paying_sizes(len(self.template))
+                order.sort(key=lambda k: (rank[k] not in paying, turn[k]))
             self._closing = order
         return self._closing
 
@@ -204,7 +204,7 @@ class VoxelizationProblems:
         list of int
             Those that were not tried count as if they came as near to their bound as the best of
             the others. Those on which nothing folded come last, and with them what was not tried
-            and is of their size: room decides.
+            and is of their size, where a size that pays folds: room decides.
         """
         floor = {
             option: (1.0 - self.at_most(option)) * visible_faces(self.template)
@@ -214,12 +214,14 @@ class VoxelizationProblems:
         gaps = [found[option] - weight * floor[option] for option in found]
         gap = min(gaps, default=0.0)
         size = [len(voxels) for voxels in self.options]
+        rank, paying = self._size_ranks(), paying_sizes(len(self.template))
+        pays = any(found[k] < float("inf") for k in found if rank[k] in paying)
 
         def expected(option: int) -> float:
             if option in found:
                 return found[option]
             alike = [found[k] for k in found if abs(size[k] - size[option]) <= _ALIKE]
-            if alike and min(alike) == float("inf"):
+            if pays and alike and min(alike) == float("inf"):
                 return float("inf")
             return weight * floor[option] + gap
 

@@ -20,7 +20,7 @@ from fabfold.voxels.refinement import PITCHES, RefinedGrid, Refinement
 from fabfold.voxels.region_cells import region_cut_cost
 from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 
-__all__ = ["MAX_LOSS", "fill_shares", "voxelize"]
+__all__ = ["LARGE", "MAX_LOSS", "fill_shares", "paying_sizes", "voxelize"]
 
 #: A voxelization that loses more than this share of the model's volume is no solution.
 MAX_LOSS = 0.10
@@ -36,8 +36,10 @@ _TRIES = 16
 #: template a rating takes long.
 _RATED = 20
 _RATED_CELLS = 1280
-#: So many sizes are rated, the fullest first: of smaller ones any does, they fold at once.
-_RATED_SIZES = 2
+#: Templates of more cells are large: nothing folds in them that fills them.
+LARGE = 72
+#: Sizes that are worth a search, the fullest that fold: emptier ones close the box less.
+_PAYING = 2
 #: Digits of a rating: more than these depend on rounding, and so on how the model lies.
 _RATING_DIGITS = 4
 #: Two voxelizations whose sorted fills differ by less than this on average are the same.
@@ -169,7 +171,7 @@ def voxelize(
             some = here.rank_again(ranked, pitches * share ** (-1 / 3))
             some = some[: max(1, shortlist // _FEWER)]
         found = _refined_grids(here, some, free, centre is not None, regions)
-        judge = rate if place < _RATED_SIZES and not regions else None
+        judge = rate if place in paying_sizes(len(template)) and not regions else None
         done += _finish(here, found, chosen, count, max_loss, regions, judge)
         if place == 0:
             full = found
@@ -196,6 +198,23 @@ def fill_shares(cells: int) -> tuple[float, ...]:
         return (1.0,)
     least = max(0.5, 1.0 - _FREE * cells ** (1 / 3))
     return tuple(float(share) for share in np.linspace(1.0, least, _SIZES))
+
+
+def paying_sizes(cells: int) -> range:
+    """Sizes of voxelization that are searched before the others.
+
+    Parameters
+    ----------
+    cells : int
+        Number of cells of the template.
+
+    Returns
+    -------
+    range
+        Their places in :func:`fill_shares`: the fullest two, of large templates without the first.
+    """
+    first = int(cells > LARGE)
+    return range(first, first + _PAYING)
 
 
 def _refined_grids(
