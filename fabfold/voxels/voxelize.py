@@ -36,9 +36,9 @@ _TRIES = 16
 #: template a rating takes long.
 _RATED = 20
 _RATED_CELLS = 1280
-#: Templates of more cells are large: nothing folds in them that fills them.
+#: Templates of more cells are large: what folds in them mostly leaves much of them free.
 LARGE = 72
-#: Sizes that are worth a search, the fullest that fold: emptier ones close the box less.
+#: Sizes that are worth a search, the fullest that mostly fold: emptier ones close the box less.
 _PAYING = 2
 #: Digits of a rating: more than these depend on rounding, and so on how the model lies.
 _RATING_DIGITS = 4
@@ -211,9 +211,9 @@ def paying_sizes(cells: int) -> range:
     Returns
     -------
     range
-        Their places in :func:`fill_shares`: the fullest two, of large templates without the first.
+        Their places in :func:`fill_shares`: the fullest two, of large templates the emptiest two.
     """
-    first = int(cells > LARGE)
+    first = _SIZES - _PAYING if cells > LARGE else 0
     return range(first, first + _PAYING)
 
 
