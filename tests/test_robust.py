@@ -230,6 +230,31 @@ main(["hang"])
     assert "goes on from there" in result.stderr
 
 
+def test_a_stop_that_a_library_makes_an_error_of_is_a_stop(tmp_path):
+    code = """
+import os, signal
+from fabfold.cli.app import _guarded, app, main
+def wrap():
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+        for _ in range(10**9): pass
+    except BaseException as error:
+        raise RuntimeError("lost on the way") from error
+app.command("wrap")(_guarded(wrap))
+main(["wrap"])
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert result.returncode == 130, result.stderr
+    assert "goes on from there" in result.stderr and "Traceback" not in result.stderr
+
+
 def test_threads_that_wait_do_not_hold_the_studio_after_its_end():
     script = """
 import threading, time

@@ -48,7 +48,8 @@ def studio(bar_kit: Any, tmp_path: Any, browser: Any) -> Iterator[Any]:
     yield page, folder, address[0]
     page.close()
     run.send_signal(signal.SIGTERM)  # a shell may have its children ignore SIGINT
-    assert run.wait(timeout=30) == 130
+    _, told = run.communicate(timeout=30)
+    assert run.returncode == 130, told
     assert page.said == []
     here = address[0].split("/?")[0].removeprefix("http://")
     for url in page.asked:

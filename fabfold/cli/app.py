@@ -72,7 +72,7 @@ from fabfold.cli.command_options import (
     number_or_text,
 )
 from fabfold.cli.model_file_check import check_model_file, is_model_file
-from fabfold.cli.stopping import hear_stops
+from fabfold.cli.stopping import hear_stops, stop_asked
 from fabfold.errors import (
     CheckError,
     FabfoldError,
@@ -99,6 +99,9 @@ app = typer.Typer(
 )
 
 
+_STOPPED = "stopped; what is done is kept, the same command goes on from there"
+
+
 def _guarded(command: Callable[..., None]) -> Callable[..., None]:
     """Turn what fabfold reports, and Ctrl-C, into one sentence and an exit code."""
 
@@ -107,19 +110,18 @@ def _guarded(command: Callable[..., None]) -> Callable[..., None]:
         try:
             command(*args, **kwargs)
             sys.stdout.flush()  # Here, so that a full disk behind it is told like any other.
-        except FabfoldError as error:
-            typer.echo(f"fabfold: {harmless(str(error))}", err=True)
-            raise typer.Exit(error.exit_code) from None
-        except OSError as error:
-            _forget_stdout()
-            typer.echo(f"fabfold: {harmless(system_message(error))}", err=True)
-            raise typer.Exit(InputError.exit_code) from None
-        except KeyboardInterrupt:
-            typer.echo(
-                "fabfold: stopped; what is done is kept, the same command goes on from there",
-                err=True,
-            )
-            raise typer.Exit(130) from None
+        except (Exception, KeyboardInterrupt) as error:
+            if stop_asked() or isinstance(error, KeyboardInterrupt):
+                told, code = _STOPPED, 130
+            elif isinstance(error, FabfoldError):
+                told, code = harmless(str(error)), error.exit_code
+            elif isinstance(error, OSError):
+                _forget_stdout()
+                told, code = harmless(system_message(error)), InputError.exit_code
+            else:
+                raise
+            typer.echo(f"fabfold: {told}", err=True)
+            raise typer.Exit(code) from None
 
     return run
 

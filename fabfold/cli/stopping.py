@@ -6,10 +6,11 @@ import os
 import signal
 import threading
 
-__all__ = ["hear_stops"]
+__all__ = ["hear_stops", "stop_asked"]
 
 #: Longest time, seconds, that threads of a server may hold the process after Ctrl-C.
 _LONGEST_END_S = 10.0
+_asked = threading.Event()
 
 
 class Stopped(KeyboardInterrupt):
@@ -20,7 +21,20 @@ class Stopped(KeyboardInterrupt):
     """
 
 
+def stop_asked() -> bool:
+    """Whether a stop was heard.
+
+    Returns
+    -------
+    bool
+        True where whatever is raised may come of it: some libraries make errors of their own of
+        what passes through them.
+    """
+    return _asked.is_set()
+
+
 def _stop(*_: object) -> None:
+    _asked.set()
     raise Stopped
 
 
@@ -28,7 +42,7 @@ def _stop_surely(*_: object) -> None:
     timer = threading.Timer(_LONGEST_END_S, os._exit, (130,))
     timer.daemon = True
     timer.start()
-    raise Stopped
+    _stop()
 
 
 def hear_stops(*, surely: bool = False) -> None:
@@ -41,6 +55,7 @@ def hear_stops(*, surely: bool = False) -> None:
         of them may wait for a page, and what is raised inside a destructor is lost. Called where
         signals are heard already.
     """
+    _asked.clear()
     stop = _stop_surely if surely else _stop
     heard = [_stop] if surely else [signal.default_int_handler, signal.SIG_DFL]
     for name in (signal.SIGTERM, signal.SIGINT):
