@@ -21,9 +21,13 @@ from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pln, gp_Pnt
 from OCP.ShapeFix import ShapeFix_Face
 from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
 from OCP.TopoDS import TopoDS_Wire
-from OCP.TopTools import TopTools_ListOfShape
 
 from .shapes import Point
+
+try:  # Since the kernel of build123d 0.13.
+    from OCP.collections import List_TopoDS_Shape as ShapeList
+except ImportError:
+    from OCP.TopTools import TopTools_ListOfShape as ShapeList
 
 __all__ = ["across_axis", "arced", "cut", "fused", "through_axis"]
 
@@ -168,8 +172,8 @@ def _solids(
     return list(bd.Compound(made).solids())
 
 
-def _listed(shapes: Iterable[bd.Shape]) -> TopTools_ListOfShape:
-    listed = TopTools_ListOfShape()
+def _listed(shapes: Iterable[bd.Shape]) -> ShapeList:
+    listed = ShapeList()
     for shape in shapes:
         listed.Append(shape.wrapped)
     return listed
