@@ -4,7 +4,7 @@
 
 Each model is cut twice in one process: once as the voxelizations of most fill come, once with those
 rated that close the box further. Names as in ``energies.py``; models that are not there are left
-out.
+out. The page is written where all are measured.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 
 from energies import MODELS, SHARED
 
-from fabfold.kit.cutting_stage import closing_rate
+from fabfold.kit.box_closure import closing_rate
 from fabfold.kit.kit import Kit
 from fabfold.voxels.voxelize import voxelize
 
@@ -64,7 +64,8 @@ def main() -> None:
         if source.startswith("sample:") or (options.models / source).is_file():
             lines.append(row(name, options.models))
             print(lines[-1], flush=True)
-    PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    if tuple(options.names) == NAMES:
+        PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

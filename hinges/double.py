@@ -264,9 +264,7 @@ class DoubleHinge(PlacedPart):
     def hardware(self) -> Part | None:
         """The loose pins in the pose with both angles 0, or None for printed ones."""
         loose = self.plan.loose
-        if not loose:
-            return None
-        return self._like(one_part([build_shape(shape) for shape in loose]))
+        return self._like(one_part([build_shape(shape) for shape in loose])) if loose else None
 
     def fit(
         self,

@@ -34,6 +34,18 @@ def fabfold(*arguments, cwd):
     )
 
 
+def run_script(code, folder):
+    """Run a script of Python in a folder, with the checkout among the places of modules."""
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+
+
 def command(*arguments):
     """The same command in this process, where it is not the process that matters."""
     return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
@@ -218,14 +230,7 @@ def hang():
 app.command("hang")(_guarded(hang))
 main(["hang"])
 """
-    result = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
+    result = run_script(code, tmp_path)
     assert result.returncode == 130, result.stderr
     assert "goes on from there" in result.stderr
 
@@ -243,14 +248,7 @@ def wrap():
 app.command("wrap")(_guarded(wrap))
 main(["wrap"])
 """
-    result = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
+    result = run_script(code, tmp_path)
     assert result.returncode == 130, result.stderr
     assert "goes on from there" in result.stderr and "Traceback" not in result.stderr
 

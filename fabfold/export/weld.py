@@ -71,7 +71,7 @@ def without_needles(
     -------
     vertices : (w, 3) float64 array
         In mm, in order of first use.
-    faces : (g, 3) integer array
+    faces : (g, 3) int32 array
         Triangles with three different corners; the mesh as it was given where joining would leave
         it open.
     """

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from fabfold.errors import NoTreeError
 from fabfold.kit.stages import PlannedTree
 from fabfold.lattice.template import Template
 from fabfold.recipe.recipe import Recipe
@@ -11,8 +13,9 @@ from fabfold.recipe.recipe_wishes import weights_of
 from fabfold.tree.bound import closed_at_most, closed_share
 from fabfold.tree.problem import from_features
 from fabfold.voxels.features import features
+from fabfold.voxels.voxel_model import Voxels
 
-__all__ = ["BoxClosure", "box_closure"]
+__all__ = ["BoxClosure", "box_closure", "closing_rate"]
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,40 @@ class BoxClosure:
         )
 
 
+def closing_rate(recipe: Recipe, template: Template) -> Callable[[Voxels], float]:
+    """What voxelizations of a model are rated by: how far they could close the box.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        Weights and joints.
+    template : Template
+        The target shape, as it is filled.
+
+    Returns
+    -------
+    callable
+        Takes voxels and returns the share of :func:`fabfold.tree.bound.closed_at_most`; 0 where no
+        tree can join them.
+    """
+
+    def rate(voxels: Voxels) -> float:
+        try:
+            problem = from_features(
+                voxels,
+                features(voxels),
+                template,
+                weights_of(recipe),
+                joints=recipe.joints,
+                share=recipe.share,
+            )
+        except NoTreeError:
+            return 0.0
+        return closed_at_most(problem)
+
+    return rate
+
+
 def box_closure(recipe: Recipe, template: Template, planned: PlannedTree) -> BoxClosure | None:
     """How closed the box of a tree is.
 
@@ -57,8 +94,5 @@ def box_closure(recipe: Recipe, template: Template, planned: PlannedTree) -> Box
     """
     if template.creases or recipe.share or recipe.skin == "lattice":
         return None
-    voxels = planned.voxels
-    problem = from_features(
-        voxels, features(voxels), template, weights_of(recipe), joints=recipe.joints
-    )
-    return BoxClosure(closed_share(planned.tree), closed_at_most(problem))
+    at_most = closing_rate(recipe, template)(planned.voxels)
+    return BoxClosure(closed_share(planned.tree), at_most)

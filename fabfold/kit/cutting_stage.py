@@ -2,58 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from fabfold.errors import NoTreeError
+from fabfold.kit.box_closure import closing_rate
 from fabfold.lattice.rotations import rotation_of_degrees
 from fabfold.lattice.template import Template
 from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
-from fabfold.recipe.recipe_wishes import weights_of
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.regions import Region
-from fabfold.tree.bound import closed_at_most
-from fabfold.tree.problem import from_features
-from fabfold.voxels.features import features
 from fabfold.voxels.thickening import Cut, cut_thick
 from fabfold.voxels.voxel_model import Voxels
 from fabfold.voxels.voxelize import voxelize
 
-__all__ = ["closing_rate", "cut_model"]
-
-
-def closing_rate(recipe: Recipe, template: Template) -> Callable[[Voxels], float]:
-    """What voxelizations of a model are rated by: how far they could close the box.
-
-    Parameters
-    ----------
-    recipe : Recipe
-        Weights and joints.
-    template : Template
-        The target shape, as it is filled.
-
-    Returns
-    -------
-    callable
-        Takes voxels and returns the share of :func:`fabfold.tree.bound.closed_at_most`; 0 where no
-        tree can join them.
-    """
-
-    def rate(voxels: Voxels) -> float:
-        try:
-            problem = from_features(
-                voxels,
-                features(voxels),
-                template,
-                weights_of(recipe),
-                joints=recipe.joints,
-                share=recipe.share,
-            )
-        except NoTreeError:
-            return 0.0
-        return closed_at_most(problem)
-
-    return rate
+__all__ = ["cut_model"]
 
 
 def cut_model(

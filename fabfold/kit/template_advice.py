@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fabfold.errors import NoVoxelsError
-from fabfold.kit.cutting_stage import closing_rate
+from fabfold.kit.box_closure import closing_rate
 from fabfold.lattice.shipped import load_template
 from fabfold.lattice.template import Template
 from fabfold.recipe.recipe import Recipe
