@@ -18,7 +18,8 @@ import pytest
 
 from fabfold.export.camera import View, direction_frame, project
 from fabfold.guide.fold_steps import gathered, turned
-from fabfold.guide.manual import STEP_PIXELS, plan_steps
+from fabfold.guide.manual import STEP_PIXELS, Manual, ManualStep, plan_steps
+from fabfold.guide.manual_pdf import manual_pdf
 from fabfold.guide.step_drawing import MOVING, STAYING, draw_step
 from fabfold.guide.step_views import _blocks, _planned, visible_share
 from fabfold.guide.wording import step_text
@@ -249,6 +250,27 @@ def test_no_words_of_the_manual_overlap(name: str, kit: SimpleNamespace) -> None
             down = min(one[3], other[3]) - max(one[1], other[1])
             # Boxes of letters are higher than letters: lines may touch.
             assert across < 0.5 or down < 2.5, (one, other)
+
+
+@pytest.mark.parametrize(("paper", "high"), [("a4", 297.0), ("letter", 279.4)])
+def test_words_of_four_lines_stay_in_the_place_of_their_step(
+    paper: str, high: float, drawn: list[Any], tmp_path: Path
+) -> None:
+    text = "; ".join(f"{letter}) quarter turn (90°): 12 parts together" for letter in "abcdef")
+    steps = tuple(ManualStep(number, text, text, True, drawn[0]) for number in range(1, 7))
+    image = drawn[0].image
+    path = tmp_path / "long.pdf"
+    made = Manual("long", "", image, ("one",), ("two",), (), steps, image, (image,), ("body",))
+    path.write_bytes(manual_pdf(made, paper))
+    (page,) = (page for page in words_of(path) if len(page) > 6 * len(text.split()))
+    top, row = 14.0, (high - 2 * 14.0 - 4.0) / 3
+    lines: dict[int, set[float]] = {0: set(), 1: set(), 2: set()}
+    for _, low, _, end in page:
+        first, last = ((point / 72 * 25.4 - top) / row for point in (low, end))
+        if first < 3:  # else the foot of the page
+            assert int(first) == int(last), (low, end)
+            lines[int(first)].add(round(low))
+    assert all(len(found) >= 5 for found in lines.values())
 
 
 def test_the_font_is_inside(kit: SimpleNamespace) -> None:

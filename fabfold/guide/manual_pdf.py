@@ -22,6 +22,8 @@ __all__ = ["PAPERS", "manual_pdf", "page_count"]
 PAPERS: Final = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
 #: Margin and gap between pictures, mm; columns and rows of steps on a page.
 _MARGIN, _GAP, _COLUMNS, _ROWS = 14.0, 6.0, 2, 3
+#: Lines below a step's picture that have room in any case, and their distance, mm.
+_LINES, _LEADING = 2, 4.4
 _ACCENT, _INK, _SOFT, _LINE = (190, 70, 20), (25, 25, 28), (105, 105, 110), (215, 213, 208)
 
 
@@ -232,13 +234,17 @@ def _step(pdf: FPDF, step: ManualStep, place: int) -> None:
         pdf.set_xy(pdf.get_x() + 9, y + 2)
         _text(pdf, 9, _ACCENT, "B")
         pdf.cell(0, 9, "turn the whole")
-    room = height - 11 - 13
+    _text(pdf, 9, _SOFT)
+    text = step.text
+    lines = pdf.multi_cell(width, _LEADING, text, dry_run=True, output="LINES")
+    if len(lines) > _LINES:
+        text = step.brief
+        lines = pdf.multi_cell(width, _LEADING, text, dry_run=True, output="LINES")
+    # The picture gives way to words that are long even so.
+    room = height - 11 - 4.2 - _LEADING * max(_LINES, len(lines))
     below = _picture(pdf, step.picture.image, x, y + 11, width, room)
     pdf.set_xy(x, min(below, y + 11 + room) + 0.5)
-    _text(pdf, 9, _SOFT)
-    lines = pdf.multi_cell(width, 4.4, step.text, dry_run=True, output="LINES")
-    text = step.text if len(lines) <= 2 else step.brief
-    pdf.multi_cell(width, 4.4, text, align="L")
+    pdf.multi_cell(width, _LEADING, text, align="L")
 
 
 def _turn_mark(pdf: FPDF, x: float, y: float) -> None:
