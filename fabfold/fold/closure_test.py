@@ -13,11 +13,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabfold.fold.mechanism import Mechanism
-from fabfold.fold.scene import Scene, clear_scene, pose_scene
+from fabfold.fold.scene import Scene, clear_scene, empty_scene, pose_scene
 from fabfold.fold.turn_obstacles import obstacles, turn_buffers
 from fabfold.lattice.sweep import SweepTable
 
-__all__ = ["movable_hinges"]
+__all__ = ["movable_hinges", "stuck_at_both_ends"]
 
 
 @njit(cache=True)
@@ -141,3 +141,32 @@ def movable_hinges(
                 movable[k // 64] |= np.uint64(1) << np.uint64(k % 64)
                 changed = True
     return loose
+
+
+@njit(cache=True)
+def stuck_at_both_ends(mech: Mechanism, table: SweepTable) -> NDArray[np.bool_]:
+    """Hinges that nothing can ever set free, from shape A and from shape B.
+
+    Parameters
+    ----------
+    mech : Mechanism
+        What is to fold.
+    table : SweepTable
+        Sweeps up to the span of the mechanism.
+
+    Returns
+    -------
+    (2, h) bool array
+        By hinges of the system that the mechanism was made of.
+    """
+    hinges = len(mech.up)
+    scene = empty_scene(mech)
+    stuck = np.zeros((2, hinges), np.bool_)
+    start = np.zeros(hinges, np.int8)
+    for way in range(2):
+        if way == 1:
+            start[:] = mech.steps
+        movable = movable_hinges(mech, scene, table, start, 1 - 2 * way)
+        for k in range(hinges):
+            stuck[way, mech.origin[k]] = not movable[k]
+    return stuck

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.fold.bidirectional_search import bidirectional_search
-from fabfold.fold.closure_test import movable_hinges
+from fabfold.fold.closure_test import stuck_at_both_ends
 from fabfold.fold.core_sweep import core_sweep_table
 from fabfold.fold.mechanism import Mechanism, mechanism
 from fabfold.fold.scene import Scene, empty_scene
@@ -153,11 +153,17 @@ def kernel_inputs(
     ValueError
         If the system's hinges are not on lattice edges, or cells that are to be carved are halves.
     """
+    mech, table = _mechanism_and_sweeps(system, carve)
+    return mech, empty_scene(mech), table
+
+
+def _mechanism_and_sweeps(system: HingeSystem, carve: float | None) -> tuple[Mechanism, SweepTable]:
+    """The first and the last of what :func:`kernel_inputs` makes."""
     if system.octants is not None:
         # Hinges keep their numbers, so that what comes out is of the system as it was.
         system, carve = refined(system, system.octants), None
     mech = mechanism(system)
-    return mech, empty_scene(mech), _sweeps(mech, carve)
+    return mech, _sweeps(mech, carve)
 
 
 def stuck_hinges(system: HingeSystem, *, carve: float | None = None) -> NDArray[np.bool_]:
@@ -180,14 +186,10 @@ def stuck_hinges(system: HingeSystem, *, carve: float | None = None) -> NDArray[
 
     See Also
     --------
-    fabfold.fold.closure_test.movable_hinges : the test.
+    fabfold.fold.closure_test.movable_hinges : the test at one end.
     """
-    mech, scene, table = kernel_inputs(system, carve)
-    stuck = np.zeros((2, len(mech.up)), dtype=bool)
-    start = np.zeros(len(mech.up), dtype=np.int8)
-    end = mech.steps.astype(np.int8)
-    stuck[0, mech.origin] = ~movable_hinges(mech, scene, table, start, 1)
-    stuck[1, mech.origin] = ~movable_hinges(mech, scene, table, end, -1)
+    mech, table = _mechanism_and_sweeps(system, carve)
+    stuck: NDArray[np.bool_] = stuck_at_both_ends(mech, table)
     return stuck
 
 

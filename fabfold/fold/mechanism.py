@@ -352,7 +352,7 @@ def _barrels_of(axis: I32, pivot: I32) -> I32:
 def _hung_on_its_middle(
     cells: I32, body: I32, parent: I32, point2: I32, axis: I32, turns: I32
 ) -> Mechanism:
-    """Mechanism of a system whose cells and hinges are given about the origin.
+    """Mechanism of a system, moved so that A is about the origin: that keeps the grids small.
 
     Parameters
     ----------
@@ -365,6 +365,10 @@ def _hung_on_its_middle(
         Ready for the kernels.
     """
     hinges = len(parent)
+    middle = np.zeros(3, np.int32)
+    for i in range(3 if len(cells) > 0 else 0):
+        middle[i] = (cells[:, i].min() + cells[:, i].max()) // 2
+    cells, point2 = cells - middle, point2 - (middle + middle)
     weight = np.zeros(hinges + 1, np.int32)
     for i in body:
         weight[i] += 1
@@ -418,6 +422,31 @@ def _hung_on_its_middle(
     )
 
 
+#: What can be wrong with a hinge.
+_FAULTS = (
+    "",
+    "hinge {hinge}: its axis does not lie on a lattice edge",
+    "hinge {hinge} turns by more than 270°",
+    "bodies are out of order: the parent of hinge {hinge} must come before its child",
+)
+
+
+@njit(cache=True)
+def _first_fault(parent: I32, point2: I32, axis: I32, turns: I32) -> tuple[int, int]:
+    """Number in `_FAULTS` of the first thing that is wrong, and the hinge; zeros for nothing."""
+    for h in range(len(parent)):
+        for i in range(3):
+            if i != axis[h] and point2[h, i] % 2 == 0:
+                return 1, h
+    for h in range(len(parent)):
+        if abs(turns[h]) > 3:
+            return 2, h
+    for h in range(len(parent)):
+        if parent[h] > h or parent[h] < 0:
+            return 3, h
+    return 0, 0
+
+
 def mechanism(system: HingeSystem) -> Mechanism:
     """Make a hinge system ready for the kernels.
 
@@ -439,23 +468,16 @@ def mechanism(system: HingeSystem) -> Mechanism:
     hinges = len(system.parent)
     point2 = np.asarray(system.point2, dtype=np.int32).reshape(hinges, 3)
     axis = np.asarray(system.axis, dtype=np.int32)
-    across = (np.arange(3) != axis[:, None]) if hinges else np.zeros((0, 3), dtype=bool)
-    if (point2[across] % 2 == 0).any():
-        bad = int(np.flatnonzero(((point2 % 2 == 0) & across).any(axis=1))[0])
-        raise ValueError(f"hinge {bad}: its axis does not lie on a lattice edge")
-    if (np.abs(np.asarray(system.turns, dtype=int)) > 3).any():
-        raise ValueError("a hinge turns by more than 270°")
+    turns = np.asarray(system.turns, dtype=np.int32)
     parent = np.asarray(system.parent, dtype=np.int32)
-    if (parent > np.arange(hinges)).any() or (parent < 0).any():
-        raise ValueError("bodies are out of order: a hinge's parent must come before its child")
-    cells = np.asarray(system.cells, dtype=np.int32).reshape(-1, 3)
-    # The middle of A at the origin keeps the grids small.
-    middle = (cells.min(axis=0) + cells.max(axis=0)) // 2 if len(cells) else np.zeros(3, np.int32)
+    fault, hinge = _first_fault(parent, point2, axis, turns)
+    if fault:
+        raise ValueError(_FAULTS[fault].format(hinge=hinge))
     return _hung_on_its_middle(
-        np.ascontiguousarray(cells - middle, dtype=np.int32),
+        np.ascontiguousarray(np.asarray(system.cells, dtype=np.int32).reshape(-1, 3)),
         np.ascontiguousarray(system.body, dtype=np.int32),
         parent,
-        np.ascontiguousarray(point2 - 2 * middle, dtype=np.int32),
+        point2,
         axis,
-        np.asarray(system.turns, dtype=np.int32),
+        turns,
     )

@@ -89,10 +89,11 @@ class HingeChoice:
             For each possible hinge; smaller is sooner.
         """
         preference = np.zeros(len(self.rows))
-        ends = zip(self.rows["u"].tolist(), self.rows["v"].tolist(), strict=True)
-        for row, (u, v) in enumerate(ends):
-            if (u, v) in pairs or (v, u) in pairs:
-                preference[row] = -bonus
+        if pairs:
+            ends = zip(self.rows["u"].tolist(), self.rows["v"].tolist(), strict=True)
+            for row, (u, v) in enumerate(ends):
+                if (u, v) in pairs or (v, u) in pairs:
+                    preference[row] = -bonus
         return preference
 
     def tree(
@@ -155,7 +156,7 @@ class HingeChoice:
         SpanningTree
             None of them twice.
         """
-        seen: set[frozenset[tuple[int, int]]] = set()
+        seen: list[SpanningTree] = []
         kept = self.preference(kept_pairs, 1.0)
         for k in range(count):
             bonus = (2.0, 0.7, 0.0)[min(k, 2)]
@@ -166,9 +167,9 @@ class HingeChoice:
                     break
             else:
                 continue
-            pairs = frozenset(tree.hinged_pairs)
-            if pairs not in seen:
-                seen.add(pairs)
+            # The first one is mostly taken, and its pairs then never asked for.
+            if not seen or all(tree.hinged_pairs != other.hinged_pairs for other in seen):
+                seen.append(tree)
                 yield tree
 
 

@@ -26,71 +26,122 @@ _BESIDE_NEIGHBOUR = 0.7
 #: Penalty for each voxel that is not in the largest piece, as a share of that for a piece: so large
 #: pieces are worn down by what lies at their rims.
 _OUTSIDE = 0.1
+#: What could join two voxels where they lie.
+_NONE, _RIGID, _SINGLE, _DOUBLE = 0, 1, 2, 3
+#: Rounding of a bound, so that it never rules out what the sum itself would let pass.
+_EVEN = 1e-9
 
 
 @njit(cache=True)
-def _root(link: NDArray[np.int32], a: int) -> int:
-    while link[a] != a:
-        link[a] = link[link[a]]
-        a = link[a]
-    return a
-
-
-@njit(cache=True)
-def _count(
+def _face_pairs(
     neighbour: NDArray[np.int32],
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Source neighbours as pairs (u, v, face of u), and the pair of each voxel and face, or -1."""
+    count = len(neighbour)
+    pairs = np.empty((3 * count, 3), np.int32)
+    pair_at = np.full((count, 6), -1, np.int32)
+    size = 0
+    for u in range(count):
+        for f in range(0, 6, 2):
+            v = neighbour[u, f]
+            if v >= 0:
+                pairs[size, 0], pairs[size, 1], pairs[size, 2] = u, v, f
+                pair_at[u, f] = pair_at[v, f ^ 1] = size
+                size += 1
+    return pairs[:size], pair_at
+
+
+@njit(cache=True)
+def _joint_kind(
+    allowed: NDArray[np.bool_],
+    child_pose: NDArray[np.int32],
+    last_single: int,
+    u: int,
+    f: int,
+    here: int,
+    there: int,
+) -> int:
+    """What could join voxel u to what lies behind its face: `_NONE`, `_RIGID` and so on."""
+    for j in range(allowed.shape[2]):
+        if child_pose[f, j, here] == there and allowed[u, f, j]:
+            if j == 0:
+                return _RIGID
+            return _DOUBLE if j > last_single else _SINGLE
+    return _NONE
+
+
+@njit(cache=True)
+def _degrees(
+    v: int,
+    but: int,
+    pairs: NDArray[np.int32],
+    pair_at: NDArray[np.int32],
+    kind: NDArray[np.int8],
+) -> tuple[int, int]:
+    """Rigid joints and joints of any kind that a voxel could have, but for those with `but`."""
+    rigid = joined = 0
+    for f in range(6):
+        e = pair_at[v, f]
+        if e >= 0 and kind[e] != _NONE and pairs[e, 0] != but and pairs[e, 1] != but:
+            joined += 1
+            rigid += kind[e] == _RIGID
+    return rigid, joined
+
+
+@njit(cache=True)
+def _recount(
+    v: int,
+    pairs: NDArray[np.int32],
+    pair_at: NDArray[np.int32],
     allowed: NDArray[np.bool_],
     child_pose: NDArray[np.int32],
     pose: NDArray[np.int32],
     last_single: int,
-    link: NDArray[np.int32],
-) -> tuple[int, int, int, int]:
-    """Rigid clusters, pieces that single hinges leave and that all joints leave, voxels outside.
+    kind: NDArray[np.int8],
+) -> None:
+    """Bring `kind` of the pairs of a voxel up to date."""
+    for f in range(6):
+        e = pair_at[v, f]
+        if e >= 0:
+            a, b = pairs[e, 0], pairs[e, 1]
+            kind[e] = _joint_kind(
+                allowed, child_pose, last_single, a, pairs[e, 2], pose[a], pose[b]
+            )
 
-    The last are those that are not in the largest piece.
 
-    Arrays of the tables one by one: numba passes a tuple of them at the cost of the whole work.
-    """
-    count = len(pose)
-    clusters = count
-    hinged = np.empty((3 * count, 3), np.int32)
-    found = 0
-    for v in range(count):
-        link[v] = v
-    for u in range(count):
-        for f in range(0, 6, 2):
-            v = neighbour[u, f]
-            if v < 0:
-                continue
-            if allowed[u, f, 0] and child_pose[f, 0, pose[u]] == pose[v]:
-                a, b = _root(link, u), _root(link, v)
-                if a != b:
-                    link[a] = b
-                    clusters -= 1
-                continue
-            for j in range(1, allowed.shape[2]):
-                if allowed[u, f, j] and child_pose[f, j, pose[u]] == pose[v]:
-                    hinged[found, 0] = u
-                    hinged[found, 1] = v
-                    hinged[found, 2] = j > last_single
-                    found += 1
-                    break
-    singles = pieces = clusters
-    for double in range(2):
-        for i in range(found):
-            if hinged[i, 2] == double:
-                a, b = _root(link, hinged[i, 0]), _root(link, hinged[i, 1])
-                if a != b:
-                    link[a] = b
-                    pieces -= 1
-        if double == 0:
-            singles = pieces
-    if pieces == 1:
-        return clusters, singles, pieces, 0
-    size = np.zeros(count, np.int32)
-    for v in range(count):
-        size[_root(link, v)] += 1
-    return clusters, singles, pieces, count - size.max()
+@njit(cache=True)
+def _join(
+    ends: NDArray[np.uint32], kind: NDArray[np.int8], wanted: int, link: NDArray[np.uint32]
+) -> int:
+    """Join all pairs of one kind; by how much that lessens the number of pieces."""
+    joined = 0
+    for e in range(len(kind)):
+        if kind[e] == wanted:
+            a, b = ends[e, 0], ends[e, 1]
+            while link[a] != a:
+                link[a] = link[link[a]]
+                a = link[a]
+            while link[b] != b:
+                link[b] = link[link[b]]
+                b = link[b]
+            if a != b:
+                link[a] = b
+                joined += 1
+    return joined
+
+
+@njit(cache=True)
+def _outside_largest(link: NDArray[np.uint32], size: NDArray[np.int32]) -> int:
+    """Number of voxels that are not in the largest piece."""
+    size[:] = 0
+    most = 0
+    for above in link:
+        root = above
+        while link[root] != root:
+            root = link[root]
+        size[root] += 1
+        most = max(most, size[root])
+    return len(link) - most
 
 
 @njit(cache=True)
@@ -133,25 +184,6 @@ def _propose(
     if r < 0:
         return -1, -1, -1
     return q, w, 24 * here + r
-
-
-@njit(cache=True)
-def _is_alone(
-    neighbour: NDArray[np.int32],
-    allowed: NDArray[np.bool_],
-    child_pose: NDArray[np.int32],
-    pose: NDArray[np.int32],
-    v: int,
-) -> bool:
-    """Whether no joint type could join voxel v to a source neighbour."""
-    for f in range(6):
-        u = neighbour[v, f]
-        if u < 0:
-            continue
-        for j in range(child_pose.shape[1]):
-            if allowed[v, f, j] and child_pose[f, j, pose[v]] == pose[u]:
-                return False
-    return True
 
 
 @njit(cache=True)
@@ -267,7 +299,7 @@ def anneal_swaps(  # noqa: PLR0912, PLR0915 - one loop, kept whole for speed
     cost, cell_neighbour = tables.cost, tables.cell_neighbour
     count = len(pose)
     label = np.empty(count, np.int32)
-    link = np.empty(count, np.int32)
+    link, size = np.empty(count, np.uint32), np.empty(count, np.int32)
     hinge_rows = np.empty(max_hinge_rows(tables), HINGE_ROW)
     now = pose.copy()
     occupant = _occupants(now, len(tables.cells))
@@ -275,36 +307,49 @@ def anneal_swaps(  # noqa: PLR0912, PLR0915 - one loop, kept whole for speed
     last_single = tables.last_single
     weight = tables.joint_weight[1]
     more = 0.0
-    if last_single + 1 < len(tables.joint_weight):
+    doubles = last_single + 1 < len(tables.joint_weight)
+    if doubles:
         more = tables.joint_weight[last_single + 1] - weight
     annealing = threshold == np.inf
     rigid_pairs = len(tables.always_rigid) > 0
     turning = not annealing
-    clusters, singles, pieces, outside = _count(
-        neighbour, allowed, child_pose, now, last_single, link
-    )
+    pairs, pair_at = _face_pairs(neighbour)
+    ends = pairs[:, :2].astype(np.uint32)
+    kind, kept = np.empty(len(pairs), np.int8), np.empty(12, np.int8)
+    for e in range(len(pairs)):
+        a, b = pairs[e, 0], pairs[e, 1]
+        kind[e] = _joint_kind(allowed, child_pose, last_single, a, pairs[e, 2], now[a], now[b])
+    for v in range(count):
+        link[v] = v
+    clusters = count - _join(ends, kind, _RIGID, link)
+    singles = clusters - _join(ends, kind, _SINGLE, link)
+    pieces = singles - _join(ends, kind, _DOUBLE, link)
+    outside = _outside_largest(link, size) if pieces > 1 else 0
     joints = weight * (clusters - 1) + more * (singles - 1)
     left = pieces - 1 + (_torn_pairs(tables, now) if rigid_pairs else 0)
     best, best_left = np.inf, count
     limit = threshold
+    draw = 0.0
     for step in range(steps):
+        done = step / steps
         if annealing:
-            done = step / steps
             if not turning and done >= turning_from:
                 turning = True
                 if left == 0:
                     left = _loose(tables, now, hinges, hinge_rows, label, generator)
                 best_left, best = left, surface + joints + (piece_penalty + count) * left
                 out[:] = now
-            heat = hot * (cold / hot) ** done
-            limit = surface + joints + piece_penalty * (left + _OUTSIDE * outside)
-            limit -= heat * np.log(1.0 - random_float(generator))
+            draw = random_float(generator)
         v = random_below(generator, count)
         if len(focus) > 0:
             v = focus[random_below(generator, len(focus))]
         q, w, p = _propose(neighbour, allowed, child_pose, now, occupant, turns, v, generator)
         if q < 0:
             continue
+        if annealing:
+            # Only now: most draws come to nothing, and powers and logarithms cost the most.
+            limit = surface + joints + piece_penalty * (left + _OUTSIDE * outside)
+            limit -= hot * (cold / hot) ** done * np.log(1.0 - draw)
         before, other = now[v], now[w] if w >= 0 else -1
         fresh = surface + np.float64(cost[v, q]) - np.float64(cost[v, before])
         if w >= 0:
@@ -320,17 +365,41 @@ def anneal_swaps(  # noqa: PLR0912, PLR0915 - one loop, kept whole for speed
         now[v] = q
         if w >= 0:
             now[w] = p
+        for f in range(6):
+            e = pair_at[v, f]
+            kept[f] = kind[e] if e >= 0 else 0
+            e = pair_at[w, f] if w >= 0 else -1
+            kept[6 + f] = kind[e] if e >= 0 else 0
+        # Taken out, a voxel leaves no fewer clusters and pieces, but for one where it was all
+        # alone; put back, it is one more, less its joints. So there are at least so many:
+        rigid, joined = _degrees(v, -1, pairs, pair_at, kind)
+        least_clusters, least_pieces = clusters + (rigid > 0), pieces + (joined > 0)
+        if w >= 0:
+            rigid, joined = _degrees(w, v, pairs, pair_at, kind)
+            least_clusters += rigid > 0
+            least_pieces += joined > 0
+            _recount(w, pairs, pair_at, allowed, child_pose, now, last_single, kind)
+        _recount(v, pairs, pair_at, allowed, child_pose, now, last_single, kind)
+        rigid, joined = _degrees(v, -1, pairs, pair_at, kind)
+        least_clusters -= rigid
+        least_pieces -= joined
+        if w >= 0:
+            rigid, joined = _degrees(w, v, pairs, pair_at, kind)
+            least_clusters -= rigid
+            least_pieces -= joined
         taken = False
-        fresh_outside = 0
-        alone = _is_alone(neighbour, allowed, child_pose, now, v) or (
-            w >= 0 and _is_alone(neighbour, allowed, child_pose, now, w)
-        )
-        if not alone or fresh + piece_penalty <= limit:
-            clusters, singles, pieces, fresh_outside = _count(
-                neighbour, allowed, child_pose, now, last_single, link
-            )
-            fresh_joints = weight * (clusters - 1) + more * (singles - 1)
-            fresh_left = pieces - 1
+        fresh_clusters = fresh_pieces = fresh_outside = fresh_left = 0
+        fresh_joints = 0.0
+        penalty = piece_penalty * max(least_pieces - 1, 0)
+        if more < 0.0 or fresh + weight * max(least_clusters - 1, 0) + penalty <= limit + _EVEN:
+            for k in range(count):
+                link[k] = k
+            fresh_clusters = count - _join(ends, kind, _RIGID, link)
+            singles = fresh_clusters - _join(ends, kind, _SINGLE, link)
+            fresh_pieces = singles - (_join(ends, kind, _DOUBLE, link) if doubles else 0)
+            fresh_outside = _outside_largest(link, size) if fresh_pieces > 1 else 0
+            fresh_joints = weight * (fresh_clusters - 1) + more * (singles - 1)
+            fresh_left = fresh_pieces - 1
             extra = piece_penalty * _OUTSIDE * fresh_outside if annealing else 0.0
             if fresh + fresh_joints + piece_penalty * fresh_left + extra <= limit:
                 if rigid_pairs:
@@ -342,7 +411,15 @@ def anneal_swaps(  # noqa: PLR0912, PLR0915 - one loop, kept whole for speed
             now[v] = before
             if w >= 0:
                 now[w] = other
+            for f in range(6):
+                e = pair_at[v, f]
+                if e >= 0:
+                    kind[e] = kept[f]
+                e = pair_at[w, f] if w >= 0 else -1
+                if e >= 0:
+                    kind[e] = kept[6 + f]
             continue
+        clusters, pieces = fresh_clusters, fresh_pieces
         surface, joints, left, outside = fresh, fresh_joints, fresh_left, fresh_outside
         occupant[before // 24] = w
         occupant[q // 24] = v
