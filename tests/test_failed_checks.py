@@ -116,7 +116,7 @@ def test_a_post_in_the_way_is_met_on_the_path_and_in_the_box(strip):
     hits = checks["moves with a collision, a look every 1°"]
     assert not hits.ok
     assert (hits.figure, hits.limit) == (1.0, 0.0)  # the path has one move
-    gap = checks["smallest gap seen on the folding path, every 10°"]
+    gap = checks["smallest gap seen on the folding path, every 30°"]
     assert not gap.ok
     assert gap.figure <= 0.0
 

@@ -25,7 +25,7 @@ __all__ = ["run_checks"]
 ANGLE_LIMIT_DEG = 1.0
 #: Degrees between poses that are searched for collisions, and at which the gap is measured.
 STEP_DEG = 1.0
-GAP_STEP_DEG = 10.0
+GAP_STEP_DEG = 30.0
 #: Most of the kit's volume that may be carved away so that cells pass each other, per cent.
 CARVED_LIMIT = 5.0
 #: Most surface over a gap that filament may fuse: so little breaks free by hand, mm².

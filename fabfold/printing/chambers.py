@@ -72,8 +72,7 @@ def find_chambers(bodies: Sequence[BodyMesh], escape_mm: float) -> list[Chamber]
     cells = np.prod((high - low + 4 * escape_mm) / (escape_mm / _FINE))
     side = escape_mm / _FINE * max(1.0, float(np.cbrt(cells / _MOST)))
     material = _material(bodies, low, high, side, 1)
-    away = ndimage.distance_transform_edt(~material).astype(np.float32) * side
-    labels, shut = _shut_in(away >= escape_mm / 2)
+    labels, shut = _shut_in(~_within(material, escape_mm / 2 / side, short=True))
     found = []
     margin = int(np.ceil(escape_mm / side)) + 1
     boxes = ndimage.find_objects(labels)
@@ -81,8 +80,7 @@ def find_chambers(bodies: Sequence[BodyMesh], escape_mm: float) -> list[Chamber]
         box = tuple(
             slice(max(0, part.start - margin), part.stop + margin) for part in boxes[label - 1]
         )
-        reach = ndimage.distance_transform_edt(labels[box] != label) * side
-        swept = (reach <= escape_mm / 2) & ~material[box]
+        swept = _within(labels[box] == label, escape_mm / 2 / side) & ~material[box]
         start = np.array([part.start for part in box])
         volume = float(swept.sum()) * side**3
         if volume < _LEAST * np.pi / 6 * escape_mm**3:
@@ -91,6 +89,26 @@ def find_chambers(bodies: Sequence[BodyMesh], escape_mm: float) -> list[Chamber]
         x, y, z = middle.tolist()
         found.append(Chamber(volume, (x, y, z)))
     return sorted(found, key=lambda chamber: -chamber.volume_mm3)
+
+
+def _within(cells: NDArray[np.bool_], radius: float, *, short: bool = False) -> NDArray[np.bool_]:
+    """Cells whose middle is no further than `radius` from that of a cell; `short` of it only.
+
+    The square of the distance, one axis after another, as far as it counts: a transform that
+    tells every distance takes some times as long.
+    """
+    square = radius * radius
+    most = int(np.floor(radius))
+    beyond = int(np.floor(square)) + 1
+    away = np.where(cells, 0, beyond).astype(np.uint8 if 2 * beyond < 256 else np.uint32)
+    for axis in range(cells.ndim):
+        line = np.moveaxis(away, axis, 0)
+        nearest = line.copy()
+        for step in range(1, min(most, len(line) - 1) + 1):
+            for to, by in ((nearest[step:], line[:-step]), (nearest[:-step], line[step:])):
+                np.minimum(to, by + line.dtype.type(step * step), out=to)
+        away = np.moveaxis(np.minimum(nearest, line.dtype.type(beyond)), 0, axis)
+    return np.asarray(away < square if short else away <= square)
 
 
 def _border(pool: int) -> int:
