@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -162,3 +163,12 @@ def test_nothing_folds_without_budget(dog):
 
     with pytest.raises(NoFoldError, match="none of"):
         solve(dog, 0, Stubborn(), Effort(restarts=2))
+
+
+def test_what_folds_while_poses_settle_is_found(dog):
+    # No budget after settling: whatever folds was asked about on the way.
+    effort = replace(QUICK, starts=1, closure_tests=0, polish_each=0, polish_best=0)
+    (found, *_) = solve(dog, 0, LatticeFoldability(), effort)
+    system = hinge_system(found.tree)
+    assert check_tree(found.tree) == []
+    assert count_free_moves(system, found.path) == len(found.path)

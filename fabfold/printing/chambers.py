@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,14 +101,15 @@ def _within(cells: NDArray[np.bool_], radius: float, *, short: bool = False) -> 
     square = radius * radius
     most = int(np.floor(radius))
     beyond = int(np.floor(square)) + 1
-    away = np.where(cells, 0, beyond).astype(np.uint8 if 2 * beyond < 256 else np.uint32)
+    kind = np.uint8 if 2 * beyond < 256 else np.uint32
+    away: NDArray[Any] = np.where(cells, 0, beyond).astype(kind)
     for axis in range(cells.ndim):
         line = np.moveaxis(away, axis, 0)
         nearest = line.copy()
         for step in range(1, min(most, len(line) - 1) + 1):
             for to, by in ((nearest[step:], line[:-step]), (nearest[:-step], line[step:])):
-                np.minimum(to, by + line.dtype.type(step * step), out=to)
-        away = np.moveaxis(np.minimum(nearest, line.dtype.type(beyond)), 0, axis)
+                np.minimum(to, by + kind(step * step), out=to)
+        away = np.moveaxis(np.minimum(nearest, kind(beyond)), 0, axis)
     return np.asarray(away < square if short else away <= square)
 
 

@@ -19,6 +19,7 @@ from fabfold.studio.force_panel import ForcePanel
 from fabfold.studio.grid_panel import GridPanel, ModelView
 from fabfold.studio.kit_scene import KitScene, cube_meshes, joinery_meshes
 from fabfold.studio.page_tasks import PageTasks, StoppedError, escaped, table
+from fabfold.studio.print_panel import PrintPanel
 from fabfold.studio.size_panel import SizePanel
 from fabfold.studio.steps import StudioSteps
 from fabfold.studio.wish_panel import WishPanel
@@ -88,6 +89,8 @@ class StudioPage:
             )
         with tabs.add_tab("Size"):
             self.size = SizePanel(server, self.change, self._material)
+        with tabs.add_tab("Print"):
+            self.printing = PrintPanel(server, self.change)
         with tabs.add_tab("Check"):
             self._add_checks(gui)
         with gui.add_folder("Steps", expand_by_default=False):
@@ -198,6 +201,7 @@ class StudioPage:
         recipe = self._steps.recipe
         self.wishes.begin(recipe)
         self.size.begin(recipe)
+        self.printing.begin(recipe)
         self._seed.value = recipe.seed
         self._effort.value = recipe.effort
         if recipe.template in self._template.options:

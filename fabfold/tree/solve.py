@@ -152,15 +152,27 @@ class _Search:
     # --- phases ----------------------------------------------------------------------------
 
     def settle(
-        self, start: SearchState, steps_each: int, heats: tuple[float, float]
-    ) -> SearchState | None:
-        """Lower energy and stuck hinges together, by the closure test alone."""
+        self, start: SearchState, steps_each: int, heats: tuple[float, float], least: float
+    ) -> tuple[SearchState | None, SearchState | None]:
+        """Lower energy and stuck hinges together, by the closure test alone.
+
+        Now and then the planner is asked of poses on the way that have no stuck hinge, where their
+        energy is below `least` and below that of all that folded before.
+
+        Returns
+        -------
+        settled, folded : SearchState or None
+            The last poses, and those of least energy of which the planner said that they fold.
+        """
         steps = steps_each * len(self.problem)
+        every = max(1, steps_each // max(1, self.effort.planner_runs))
         hot, cold = heats
         weight = self.objective.energy
         now = self.judged(start.pose, start.energy, None, math.inf, plan=False)
         if now is None:
-            return None
+            return None, None
+        folded = seen = None
+        asked = -every
         for step in range(steps):
             if self.stopped():
                 break
@@ -172,7 +184,24 @@ class _Search:
             if found is not None:
                 bound = value - weight * found[1]
                 now = self.judged(found[0], found[1], now, bound, plan=False) or now
-        return now
+            due = step - asked >= every or step == steps - 1
+            if due and now.penalty == 0 and now is not seen:
+                asked = step
+                energy, _ = energy_of(self.problem.tables, now.pose, self.problem.empty_face)
+                if energy < least - _GAIN:
+                    now, folds = self.asked_of_planner(now)
+                    if folds:
+                        least, folded = energy, now
+                seen = now
+        return now, folded
+
+    def asked_of_planner(self, state: SearchState) -> tuple[SearchState, bool]:
+        """A state without stuck hinges with the planner's steps, and whether it folds."""
+        assert state.tree is not None
+        if not self.effort.planner_runs:
+            return state, False
+        left = self.planner_estimate(state.tree, state.guide, False)
+        return replace(state, guide=left.guide), not left.unresolved.any()
 
     def fold(self, start: SearchState) -> SearchState | None:
         """Phase A: trade energy for foldability until a tree folds."""
@@ -249,12 +278,17 @@ class _Search:
         return Candidate(fold_tree(self.problem, state.pose, state.tree), path, self.seed)
 
     def settled_and_folded(
-        self, start: SearchState, steps: int, heats: tuple[float, float]
+        self,
+        start: SearchState,
+        steps: int,
+        heats: tuple[float, float],
+        least: float = math.inf,
     ) -> SearchState | None:
         """A tree that folds, settled from a start and polished for a moment; None for none."""
         self.moves.tables = self.phase_a_tables
-        settled = self.settle(start, steps, heats) if steps else start
-        folded = None if settled is None else self.fold(settled)
+        settled, folded = self.settle(start, steps, heats, least) if steps else (start, None)
+        if folded is None and settled is not None:
+            folded = self.fold(settled)
         self.moves.tables = self.problem.tables
         if folded is None:
             return None
@@ -274,7 +308,7 @@ class _Search:
         for _ in range(effort.kicks):
             if idle >= effort.kick_patience or self.stopped():
                 break
-            found = self.settled_and_folded(now, effort.kick_steps, _KICKED)
+            found = self.settled_and_folded(now, effort.kick_steps, _KICKED, now.energy)
             idle += 1
             if found is not None and found.energy < now.energy - _GAIN:
                 now, idle = found, 0
