@@ -32,6 +32,7 @@ def test_a_first_kit_has_bodies_and_the_proof(bar_kit, found, tmp_path):
     with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), listener) as early:
         early.start(found)
         early.start(found)
+        early.wait()
     _, candidate = found
     tree = json.loads((tmp_path / "tree.json").read_text("utf-8"))
     motion = json.loads((tmp_path / "motion.json").read_text("utf-8"))
@@ -58,5 +59,25 @@ def test_a_tree_whose_bodies_do_not_come_out_says_why_and_leaves_nothing(bar_kit
     huge = replace(mode, profile=mode.profile.model_copy(update={"clearance_mm": 4.9}))
     with EarlyKit(tmp_path, bar_kit.recipe, huge, listener) as early:
         early.start(found)
+        early.wait()
     assert "Error" in listener.told["early"]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_it_is_given_up_once_the_search_is_over(bar_kit, found, tmp_path):
+    listener = Listener()
+    with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), listener) as early:
+        early.start(found)
+    assert listener.told["early"] == "given up: the search is over"
+    assert not list(tmp_path.rglob(".part-*"))
+
+
+@pytest.mark.slow
+def test_it_is_finished_where_the_search_was_stopped(bar_kit, found, tmp_path):
+    with (
+        pytest.raises(KeyboardInterrupt),
+        EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), SilentListener()) as early,
+    ):
+        early.start(found)
+        raise KeyboardInterrupt
+    assert (tmp_path / f"{bar_kit.recipe.name}.3mf").is_file()

@@ -27,7 +27,8 @@ class EarlyKit:
     A thread only waits for it: MeshLab, which looks at the bodies, may not be used in a thread that
     is not the first. What is written is what a printer needs and the proof that it folds:
     ``tree.json``, ``motion.json`` with its certificate, the bodies and the 3MF. Everything is
-    replaced by the final kit. Where the tree cannot be built, nothing is written.
+    replaced by the final kit, so it is given up where the search is over sooner. Where the tree
+    cannot be built, nothing is written.
 
     Parameters
     ----------
@@ -45,6 +46,8 @@ class EarlyKit:
         self._folder, self._recipe, self._mode = folder, recipe, mode
         self._listener = listener
         self._thread: threading.Thread | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._over = False
 
     def start(self, found: Found) -> None:
         """Begin with a tree; only the first call counts, and only in a folder without a kit."""
@@ -60,7 +63,15 @@ class EarlyKit:
     def __enter__(self) -> EarlyKit:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Give up what the final kit replaces; where none will come, wait until it is written."""
+        if kind is None:
+            self._over = True
+            if self._process is not None:
+                self._process.terminate()
+        self.wait()
+
+    def wait(self) -> None:
         """Wait until nothing is written any more."""
         if self._thread is not None:
             self._thread.join()
@@ -69,16 +80,24 @@ class EarlyKit:
         work = pickle.dumps((planned, self._mode, self._recipe, self._folder))
         command, environment = module_call("fabfold.kit.early")
         with self._listener.stage("early") as progress:
-            done = subprocess.run(
-                command, input=work, env=environment, capture_output=True, check=False
+            process = self._process = subprocess.Popen(
+                command,
+                env=environment,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
             )
-            if done.returncode:
-                # The search has other trees.
-                why = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
-                progress.update(1.0, f"not this one: {' '.join(why)}")
-                return
+            if self._over:
+                process.terminate()
+            _, said = process.communicate(work)
             hinges, closed = len(planned.tree.hinges), 100 * closed_share(planned.tree)
             text = f"{hinges} hinges, box closed to {closed:.0f} %; better ones replace it"
+            if process.returncode and self._over:
+                text = "given up: the search is over"
+            elif process.returncode:
+                # The search has other trees.
+                why = said.decode(errors="replace").strip().splitlines()[-1:]
+                text = f"not this one: {' '.join(why)}"
             progress.update(1.0, text)
 
 
@@ -106,4 +125,6 @@ def write_early(work: bytes) -> None:
 if __name__ == "__main__":
     end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # Given up, it takes its temporary file along.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     write_early(sys.stdin.buffer.read())
