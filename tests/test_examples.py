@@ -20,7 +20,7 @@ EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
 #: for searches that are over before those have started.
 STAND_INS = {
     "01_fold_a_sample": {
-        '"sample:car", effort="quick"': '"sample:car", template="box-2x2x4", effort="quick"',
+        '"sample:car", effort="quick"': '"sample:car", template="box-2x2x2", effort="quick"',
         "seed=1": "seed=1, workers=1",
     },
     "02_own_model": {'effort="quick"': 'effort="quick", workers=1'},
@@ -86,7 +86,7 @@ def test_examples_are_numbered_and_all_in_the_table():
 def test_01_folds_a_sample(car):
     home, said = car
     tree, motion = check_kit(home / "car-kit")
-    assert tree["template"]["name"] == "box-2x2x4"
+    assert tree["template"]["name"] == "box-2x2x2"
     assert f"{len(tree['bodies'])} bodies hang on {len(tree['hinges'])} hinges" in said
     assert f"It folds in {len(motion['keyframes']) - 1} moves" in said
     assert (home / "car-kit" / "car.3mf").is_file()
@@ -104,9 +104,9 @@ def test_05_reads_a_kit_without_fabfold(car):
     sizes = [
         tuple(map(int, re.findall(r"(\d+) x (\d+) x (\d+) mm", line)[0])) for line in said[:-2]
     ]
-    assert sizes[-1] == (40, 40, 80)
+    assert sizes[-1] == (40, 40, 40)
     assert sizes[0] != sizes[-1]
-    assert "voxels end in their cells of box-2x2x4" in said[-1]
+    assert "voxels end in their cells of box-2x2x2" in said[-1]
 
 
 @pytest.mark.slow

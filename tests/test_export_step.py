@@ -17,7 +17,7 @@ from export_kits import BARREL_MM, CLEARANCE_MM, row_joinery, row_tree
 from fabfold.errors import GeometryError
 from fabfold.export.body_brep import brep_of
 from fabfold.export.step import write_step
-from fabfold.export.steptext import _string
+from fabfold.export.steptext import StepSolid, _string, step_text
 from fabfold.export.surfaces import Axis, Plane, Round, flat_regions, round_regions
 from fabfold.export.thin import thinned
 from fabfold.export.weld import without_needles
@@ -117,7 +117,7 @@ def test_a_body_that_the_kernel_refuses_is_written_flat(tmp_path, monkeypatch):
 
     monkeypatch.setattr(step, "_measured", strict)
     facts = write_step(tmp_path / "row.step", joinery, tree)
-    assert len(refused) == 2  # thinned and not
+    assert len(refused) == 3  # thinned, the same without slivers, and not thinned
     assert facts.plain == ("body-01",)
     solids = _read(tmp_path / "row.step").solids()
     assert all(_valid(solid) for solid in solids)
@@ -130,13 +130,37 @@ def test_a_body_that_the_kernel_refuses_is_written_flat(tmp_path, monkeypatch):
 def test_triangles_alone_make_a_valid_solid(tmp_path, monkeypatch):
     from fabfold.export import step
 
-    monkeypatch.setattr(step, "_LEVELS", ("triangles",))
+    monkeypatch.setattr(step, "_LEVELS", (("triangles", 0.0),))
     ball = m3.Manifold.sphere(10, 24) - m3.Manifold.cube((10, 10, 10))
     write_step(tmp_path / "ball.step", _joinery(ball))
     (solid,) = _read(tmp_path / "ball.step").solids()
     assert _valid(solid)
     assert len(solid.faces()) == ball.num_tri()
     assert solid.volume == pytest.approx(ball.volume(), rel=1e-4)
+
+
+def test_a_face_that_crosses_itself_by_less_than_a_thousandth_is_mended(tmp_path):
+    from fabfold.export import step
+
+    rim = [(0, 0), (10, 0), (10, 10), (5, 10), (5.0006, 9.9997), (4.9998, 10.0003), (0, 10)]
+    count = len(rim)
+    vertices = np.array([(x, y, z) for z in (0.0, 4.0) for x, y in [*rim, (4.0, 4.0)]])
+    faces = []
+    for k in range(count):
+        a, b, up = k, (k + 1) % count, count + 1
+        faces += [(b, a, count), (a + up, b + up, count + up), (a, b, b + up), (a, b + up, a + up)]
+    body = BodyMesh("body-00", vertices, np.array(faces, dtype=np.int32))
+    wanted = mesh_volume(body.vertices, body.faces)
+    crossing = step._brep(body, [], "flat", 0.0, 2e-5)
+    assert not step._measured(step_text([StepSolid("a", crossing, (0, 0, 0))], "a", "b"))[0]
+    joinery = _joinery(m3.Manifold.cube((1, 1, 1)))
+    object.__setattr__(joinery, "bodies", (body,))
+    facts = write_step(tmp_path / "mended.step", joinery)
+    (solid,) = _read(tmp_path / "mended.step").solids()
+    assert _valid(solid)
+    assert solid.volume == pytest.approx(wanted, rel=1e-4)
+    assert facts.plain == ()
+    assert len(solid.faces()) < len(faces)
 
 
 def test_a_mesh_that_is_no_solid_is_named(tmp_path):

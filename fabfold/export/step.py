@@ -40,12 +40,20 @@ __all__ = ["StepFacts", "write_step"]
 
 #: A solid's volume may differ from its mesh's by this share before it is written again.
 VOLUME_SHARE = 0.01
-#: Shorter edges are the last digits of single precision, which the CAD kernel cannot take.
-_SHORTEST_MM = 2e-5
+#: Shorter edges are the last digits of single precision, which the CAD kernel cannot take; and
+#: those that go too where it says that a face crosses itself, far below what anything prints.
+_SHORTEST_MM, _SHORT_MM = 2e-5, 2e-3
 #: Sculpted surfaces may be thinned to within this share of the voxel side.
 THIN_SHARE = 0.003
-#: What is tried in turn: thinned surfaces may cross themselves, round faces may be refused.
-_LEVELS = ("round, thinned", "round", "flat", "triangles")
+#: What is tried in turn, with the shortest edge that stays: slivers may cross themselves, thinned
+#: surfaces too, and round faces may be refused.
+_LEVELS = (
+    ("round, thinned", _SHORTEST_MM),
+    ("round, thinned", _SHORT_MM),
+    ("round", _SHORT_MM),
+    ("flat", _SHORT_MM),
+    ("triangles", _SHORTEST_MM),
+)
 
 
 @dataclass(frozen=True)
@@ -197,9 +205,9 @@ def _sound_brep(
     """The best faces whose solid is valid and has the mesh's volume."""
     wanted = mesh_volume(body.vertices, body.faces)
     faults = []
-    for level in _LEVELS:
+    for level, shortest_mm in _LEVELS:
         try:
-            brep = _brep(body, axes, level, thin_mm)
+            brep = _brep(body, axes, level, thin_mm, shortest_mm)
             valid, volume = _measured(
                 step_text([StepSolid(body.name, brep, (0, 0, 0))], body.name, application)
             )
@@ -215,8 +223,8 @@ def _sound_brep(
     )
 
 
-def _brep(body: BodyMesh, axes: list[Axis], level: str, thin_mm: float) -> Brep:
-    vertices, faces = without_needles(body.vertices, body.faces, _SHORTEST_MM)
+def _brep(body: BodyMesh, axes: list[Axis], level: str, thin_mm: float, shortest_mm: float) -> Brep:
+    vertices, faces = without_needles(body.vertices, body.faces, shortest_mm)
     if level == "triangles":
         points, faces = weld_rounded(vertices, faces)
         vertices = points.astype(np.float64)
