@@ -47,7 +47,7 @@ _MENDS, _MEND_SHARE, _MEND_HOT, _MEND_PIECE = 3, 0.25, 0.15, 0.6
 #: Phases are drawn by their bound: the best one so often, else the next one so often, and so on.
 _BEST_PHASE = 0.5
 #: Annealings in a row that end in pieces after which poses are grown instead.
-_PATIENCE = 2
+_PATIENCE = 4
 
 
 class PoseMoves:
