@@ -131,11 +131,10 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         "Written by `python benchmarks/retention.py`: kits of PLA printed apart",
         "(`--effort quick --profile fdm-pla-0.4 --retention magnet+friction`, magnets 3 × 1 mm).",
         "*Moves* counts hinges that move, to first order, when the faces of the box are shut;",
-        "those that magnets leave get friction pins. *Pin holds* is the torque of one friction pin",
+        "all of them get friction pins. *Pin holds* is the torque of one friction pin",
         "at the strain that PLA bears; *weight asks* the largest torque of the weight about any",
         "hinge that moves. *Stays shut*: sides of six that can be up without a hinge opening by 5°",
-        "when the box is let go in MuJoCo, with friction of 0.3 between bodies; *friction pins*",
-        "alone are in all hinges that move.",
+        "when the box is let go in MuJoCo, with friction of 0.3 between bodies.",
         "",
         "| kit | hinges | moves | with magnets | pairs | pin holds N mm | weight asks N mm | stays "
         "shut, nothing | magnets | friction pins | both |",

@@ -306,7 +306,7 @@ def test_a_kit_tells_its_pauses_and_what_friction_holds(searched, bar, bar_optio
     held = {check["name"]: check for check in report["checks"]}
     assert held["hinges held in the model"]["figure"] > 0
     rubbing = data["friction_pins"]
-    assert ([] if rubbing is None else rubbing["hinges"]) == data["held_by_friction_only"]
+    assert ([] if rubbing is None else rubbing["hinges"]) == data["moves_without"]
     assert open_kit(str(folder), workers=1).join().retention == kit.join().retention
 
 

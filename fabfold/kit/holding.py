@@ -105,7 +105,7 @@ def hold_kit(
     else:
         moving = tuple(hinges_that_move(tree, motion, joinery))
         retention = Retention(moving, moving)
-    if hold.friction and apart is not None and retention.free_after:
+    if hold.friction and apart is not None and retention.free_before:
         joinery, apart, retention = _with_friction(tree, motion, joinery, apart, mode, retention)
     return joinery, apart, retention
 
@@ -120,15 +120,17 @@ def _with_friction(
 ) -> tuple[Joinery, ApartKit, Retention]:
     from fabfold.apart.pin_replay import replay_assembly
 
+    # In hinges that magnets hold too: a pair takes hold once its faces lie on each other, and what
+    # tilts a box open pulls them apart.
     fit, bores = mode.profile.apart, pin_bores(tree, joinery)
-    joinery = with_friction(joinery, bores, retention.free_after, fit.grip_mm, fit.slip_mm)
+    joinery = with_friction(joinery, bores, retention.free_before, fit.grip_mm, fit.slip_mm)
     # Linings add material: what was played through is played through again.
     apart = replace(apart, replay=replay_assembly(tree, joinery, bores, apart.steps, mode.pin_fit))
     friction = pin_friction(
         tree,
         joinery,
         motion.angles_deg[-1],
-        retention.free_after,
+        retention.free_before,
         material=mode.profile.material,
         density_g_cm3=mode.profile.density_g_cm3,
         grip_mm=fit.grip_mm,
