@@ -43,13 +43,16 @@ def split_at_plane(
         Triangles, none with corners on both sides of the plane. Orientation and closedness are
         kept.
     """
-    side = np.sign(vertices[:, axis] - position).astype(np.int8)
-    corner_side = side[faces]
-    crossing = (corner_side.min(axis=1) < 0) & (corner_side.max(axis=1) > 0)
+    place = vertices[:, axis]
+    side = (place > position).view(np.int8) - (place < position).view(np.int8)
+    # Corner by corner: numpy takes ten times as long along an axis of three.
+    one, two, three = (side[faces[:, corner]] for corner in range(3))
+    crossing = np.minimum(np.minimum(one, two), three) < 0
+    crossing &= np.maximum(np.maximum(one, two), three) > 0
     if not crossing.any():
         return vertices, faces
     cut = faces[crossing]
-    cut_side = corner_side[crossing]
+    cut_side = side[cut]
 
     # Turn each triangle so that its first corner is the one that stands alone: on the plane, with
     # the others on either side, or else by itself on its side of the plane.
