@@ -9,6 +9,7 @@ from typing import Any
 
 from fabfold.errors import FabfoldError, KitError
 from fabfold.files import write_json
+from fabfold.kit.holding import mode_of
 from fabfold.kit.kit import Kit
 from fabfold.physics.actions import Action, actions_json
 from fabfold.recipe.recipe import Recipe, make_recipe
@@ -87,11 +88,12 @@ class StudioSteps:
         Raises
         ------
         RecipeError
-            If a value is wrong; then nothing changes.
+            If a value is wrong, or the printer cannot do what is asked; then nothing changes.
         """
         recipe = make_recipe(**{**self.recipe.model_dump(), **fields})
         if recipe == self.recipe:
             return
+        mode_of(recipe)  # What the printer cannot do is no step.
         del self.steps[self.place + 1 :]
         self.steps.append(Step(title, recipe))
         del self.steps[1 : max(1, len(self.steps) - _MOST)]
