@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import resource
+import statistics
 import subprocess
 import sys
 import time
@@ -153,6 +154,7 @@ def table(rows: dict[str, dict[str, Any]], before: dict[str, dict[str, Any]]) ->
             f"ratio {energy:.2f}; median ratio of processor seconds {seconds:.2f} (without the "
             "sample car).",
         ]
+    lines += medians(rows)
     lines += ["", "## Closed after so many seconds of the search (normal effort)", ""]
     lines += ["| model | seed | " + " | ".join(f"{m} s" for m in MARKS) + " |"]
     lines += ["|" + "---|" * (len(MARKS) + 2)]
@@ -169,6 +171,38 @@ def table(rows: dict[str, dict[str, Any]], before: dict[str, dict[str, Any]]) ->
         "In brackets: energy. The same as a plot: ![](../docs/pictures/" + PLOT.name + ")",
     ]
     return "\n".join(lines) + "\n"
+
+
+def medians(rows: dict[str, dict[str, Any]]) -> list[str]:
+    """Table of the models that several seeds searched at normal effort."""
+    lines = [
+        "",
+        "## Median of seeds (normal effort)",
+        "",
+        "*left* is what is left between *closed* and *at most*.",
+        "",
+        "| model | seeds | energy | hinges | closed | left | search s |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name in MODELS:
+        found = [
+            row
+            for key, row in rows.items()
+            if key.startswith(name + ",") and row["effort"] == "normal" and "error" not in row
+        ]
+        if len(found) < 3:
+            continue
+        cells = [name, ", ".join(str(seed) for seed in sorted(row["seed"] for row in found))]
+        for value, digits in (
+            ([row["energy"] for row in found], 2),
+            ([row["hinges"] for row in found], 0),
+            ([row["closed"] for row in found], 3),
+            ([row["at_most"] - row["closed"] for row in found], 3),
+            ([row["search_s"] for row in found], 1),
+        ):
+            cells.append(f"{statistics.median(value):.{digits}f}")
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
 
 
 def plot(rows: dict[str, dict[str, Any]]) -> str:
