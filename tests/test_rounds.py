@@ -177,3 +177,13 @@ def test_a_round_looks_at_roomy_voxelizations_first_and_goes_on_where_it_pays(tm
     too_much = open_kit(str(folder), workers=1, closed=1.0)
     with pytest.raises(NoFoldError, match=f"no box of box-3x3x3 .* further than to {best:.2f}"):
         too_much.fit()
+
+
+def test_fewer_seeds_search_a_large_template_at_normal_effort():
+    for effort, fewer in (("quick", False), ("normal", True), ("thorough", False)):
+        usual, large = (schedule(effort, 0, large=large) for large in (False, True))
+        assert (usual != large) == fewer
+        assert usual[0] == large[0]  # the guarantee
+        if fewer:
+            assert sum(rung.seeds for rung in large) < sum(rung.seeds for rung in usual) / 2
+            assert {rung.effort for rung in large} <= {rung.effort for rung in usual}

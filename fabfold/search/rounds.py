@@ -285,7 +285,7 @@ class Rounds:
     # The rungs of a round ---------------------------------------------------------------------
 
     def _rungs(self, number: int) -> tuple[Rung, ...]:
-        return schedule(self.recipe.effort, number)
+        return schedule(self.recipe.effort, number, large=len(self.template) > LARGE)
 
     def _search_round(
         self, number: int, pool: Executor, tally: Tally, budget: Budget

@@ -80,6 +80,9 @@ def _rungs(
 _SCHEDULES: dict[str, tuple[Rung, ...]] = {
     "quick": _rungs(EFFORTS["quick"], (2, 2), ((2, 1),), ((1, 4),)),
     "normal": _rungs(EFFORTS["normal"], (3, 3), ((4, 2), (4, 1)), ((2, 4), (2, 4))),
+    # On large templates a seed takes ten times as long, and few of them fold: what more of them
+    # find does not pay.
+    "normal, large": _rungs(EFFORTS["normal"], (2, 2), ((2, 1),), ((1, 4),)),
     "thorough": _rungs(
         EFFORTS["thorough"],
         (12, 6),
@@ -89,7 +92,7 @@ _SCHEDULES: dict[str, tuple[Rung, ...]] = {
 }
 
 
-def schedule(effort: str, number: int) -> tuple[Rung, ...]:
+def schedule(effort: str, number: int, *, large: bool = False) -> tuple[Rung, ...]:
     """Rungs of a round.
 
     Parameters
@@ -99,13 +102,16 @@ def schedule(effort: str, number: int) -> tuple[Rung, ...]:
     number : int
         Of the round, from 0. Rounds after the first follow where nothing folded: they try more
         roomy voxelizations before the others.
+    large : bool
+        Whether the template is large; at normal effort fewer seeds search then.
 
     Returns
     -------
     tuple of Rung
         In the order in which they run.
     """
-    first, *others = _SCHEDULES[effort]
+    large = large and effort == "normal"
+    first, *others = _SCHEDULES["normal, large" if large else effort]
     if number == 0:
         return (first, *others)
     return (replace(first, seeds=4, options=4), *others)
