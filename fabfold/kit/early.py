@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 from fabfold.child_process import end_with_parent, module_call
@@ -101,13 +102,15 @@ class EarlyKit:
             progress.update(1.0, text)
 
 
-def write_early(work: bytes) -> None:
+def write_early(work: bytes, before_writing: Callable[[], object] = lambda: None) -> None:
     """Build and write what :class:`EarlyKit` asks for.
 
     Parameters
     ----------
     work : bytes
         Pickle of the planned tree, the print mode, the recipe and the folder.
+    before_writing : callable, optional
+        Called once the bodies are made.
 
     Raises
     ------
@@ -119,12 +122,12 @@ def write_early(work: bytes) -> None:
 
     planned, mode, recipe, folder = pickle.loads(work)
     built = build(planned, mode, recipe.voxel_mm, (), SilentProgress())
+    before_writing()
     write_printable(folder, recipe, mode, built)
 
 
 if __name__ == "__main__":
     end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    # Given up, it takes its temporary file along.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    write_early(sys.stdin.buffer.read())
+    # Given up before it writes anything, or not at all: there are no half-written kits.
+    write_early(sys.stdin.buffer.read(), lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN))
