@@ -1,6 +1,7 @@
 """Many seeds over processes: the same answer, whoever runs it and whatever dies."""
 
 import multiprocessing
+import signal
 import subprocess
 import sys
 import time
@@ -224,3 +225,19 @@ def test_seeds_that_fit_but_do_not_fold_give_nothing(problem):
     known = {0: result, 1: replace(result, fits=False)}
     assert search(problem, [0, 1], LatticeFoldability(), EFFORT, known=known) == []
     np.testing.assert_equal(known[0], result)
+
+
+def test_a_stop_is_heard_once_a_process_has_started():
+    from fabfold.search.processes import _stops_held
+
+    heard = []
+    before = signal.signal(signal.SIGTERM, lambda *_: heard.append("stop"))
+    try:
+        mine = signal.getsignal(signal.SIGTERM)
+        with _stops_held():
+            signal.raise_signal(signal.SIGTERM)
+            assert heard == []
+        assert heard == ["stop"]
+        assert signal.getsignal(signal.SIGTERM) is mine
+    finally:
+        signal.signal(signal.SIGTERM, before)

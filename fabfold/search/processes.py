@@ -109,7 +109,7 @@ class ProcessExecutor:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(theirs,), name="fabfold-seed", daemon=True)
-        with _interrupts_held(), safe_path():
+        with _stops_held(), safe_path():
             process.start()
         theirs.close()
         worker = _Worker(process, ours)
@@ -176,19 +176,31 @@ def _end(process: BaseProcess) -> None:
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back while a process starts: it comes with the signal blocked, we get it after.
+def _stops_held() -> Iterator[None]:
+    """Hold a stop back while a process starts; it is heard after.
 
-    Ctrl-C reaches the whole process group; the parent decides what is kept and ends the workers.
+    A process whose parent is stopped before it was told all would say so with a traceback. Ctrl-C
+    reaches the whole process group: the process comes with that signal blocked, since the parent
+    decides what is kept and ends the workers. Blocking alone would not do, for another thread of
+    this process may take a signal, and Python's handler then runs in the first one all the same.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    asked: list[int] = []
+    heard = {name: signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)}
+    heard = {name: handler for name, handler in heard.items() if callable(handler)}
+    for name in heard:
+        signal.signal(name, lambda number, _: asked.append(number))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for name, handler in heard.items():
+            signal.signal(name, handler)
+        if asked:
+            signal.raise_signal(asked[0])
 
 
 def _serve(connection: Connection) -> None:
