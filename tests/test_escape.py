@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 import trimesh
 from export_kits import row_joinery, row_motion, row_tree
+from scipy import ndimage
 
 from fabfold.joinery.bodies import BodyMesh
 from fabfold.joinery.cells import solids_of
 from fabfold.printing.body_checks import check_bodies
-from fabfold.printing.chambers import find_chambers
+from fabfold.printing.chambers import _within, find_chambers
 from fabfold.printing.file_checks import check_file
 from fabfold.printing.print_pose import print_pose
 from fabfold.printing.profiles import load_profile
@@ -134,3 +135,11 @@ def test_a_kit_whose_body_is_hollow_fails():
     assert "in body-00 around 1" in check.note
     told = float(check.note.split(" mm³")[0])
     assert told == pytest.approx(512.0, rel=0.1)
+
+
+@pytest.mark.parametrize("radius", [0.4, 1.0, 1.5, 4.37, 5.0, 12.2])
+def test_the_reach_of_a_ball_is_that_of_the_exact_distance(radius):
+    cells = np.random.default_rng(0).random((30, 24, 18)) < 0.003
+    distance = ndimage.distance_transform_edt(~cells)
+    assert (_within(cells, radius) == (distance <= radius)).all()
+    assert (_within(cells, radius, short=True) == (distance < radius)).all()

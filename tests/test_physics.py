@@ -9,10 +9,12 @@ from itertools import pairwise
 import joinery_models
 import numpy as np
 import pytest
+from tree_cases import QUICK, animal
 
 from fabfold.cli.app import main
 from fabfold.errors import NoFoldError, RecipeError
 from fabfold.fold.core_sweep import CORE_HALF_SIDE
+from fabfold.fold.lattice_foldability import LatticeFoldability
 from fabfold.fold.lattice_planner import count_free_moves
 from fabfold.physics.actions import (
     Carve,
@@ -28,6 +30,7 @@ from fabfold.physics.actions import (
 from fabfold.physics.forced_path import physics_path
 from fabfold.physics.lattice_path import lattice_path, steps_of
 from fabfold.physics.unfolding import Unfolding, cell_boxes, repulsion
+from fabfold.tree.solve import solve
 from fabfold.tree.system import hinge_system
 
 
@@ -207,23 +210,34 @@ def dog(animal_trees):
     return animal_trees[0]
 
 
-@pytest.mark.slow
-def test_steps_that_are_not_free_yet_wait(dog):
-    """A motion whose moves come too soon, each two in the wrong order, is put right."""
-    system = hinge_system(dog.tree)
-    twos = [dog.path[first : first + 2] for first in range(0, len(dog.path), 2)]
-    too_soon = np.concatenate([two[::-1] for two in twos])
-    assert count_free_moves(system, dog.path) == len(dog.path)
-    assert count_free_moves(system, too_soon, carve=CORE_HALF_SIDE) < len(too_soon)
-    way = np.zeros((len(too_soon) + 1, len(system.turns)))
-    sign = np.sign(dog.tree.fold_angles)
-    for row, (hinge, quarters) in enumerate(too_soon.tolist(), start=1):
+def put_right(candidate, moves):
+    """Check that a tree's moves are put right that were made in an order that cells forbid."""
+    tree, system = candidate.tree, hinge_system(candidate.tree)
+    assert count_free_moves(system, candidate.path) == len(candidate.path)
+    assert count_free_moves(system, moves, carve=CORE_HALF_SIDE) < len(moves)
+    way = np.zeros((len(moves) + 1, len(system.turns)))
+    sign = np.sign(tree.fold_angles)
+    for row, (hinge, quarters) in enumerate(moves.tolist(), start=1):
         way[row] = way[row - 1]
         way[row, hinge] += 90 * quarters * int(np.sign(system.turns[hinge])) * sign[hinge]
-    path, left = lattice_path(dog.tree, way, way[-1:])
+    path, left = lattice_path(tree, way, way[-1:])
     assert left == 0
     assert path is not None
     assert count_free_moves(system, path, carve=CORE_HALF_SIDE) == len(path)
+
+
+@pytest.mark.slow
+def test_steps_that_are_not_free_yet_wait():
+    """A motion made backwards is put right."""
+    pup = solve(animal(30, "box-3x4x4", 3), 0, LatticeFoldability(), QUICK)[0]
+    put_right(pup, pup.path[::-1])
+
+
+@pytest.mark.slow
+def test_moves_that_come_too_soon_wait(dog):
+    """Each two moves in the wrong order are put right, on a tree of more hinges."""
+    twos = [dog.path[first : first + 2] for first in range(0, len(dog.path), 2)]
+    put_right(dog, np.concatenate([two[::-1] for two in twos]))
 
 
 @pytest.mark.slow

@@ -168,7 +168,7 @@ class HingeChoice:
             else:
                 continue
             # The first one is mostly taken, and its pairs then never asked for.
-            if not seen or all(tree.hinged_pairs != other.hinged_pairs for other in seen):
+            if all(tree.hinged_pairs != other.hinged_pairs for other in seen):
                 seen.append(tree)
                 yield tree
 

@@ -110,6 +110,17 @@ def _recount(
 
 
 @njit(cache=True)
+def _copy_kinds(
+    v: int, pair_at: NDArray[np.int32], source: NDArray[np.int8], target: NDArray[np.int8]
+) -> None:
+    """Copy what could join the pairs of a voxel: to work it out again takes longer."""
+    for f in range(6):
+        e = pair_at[v, f]
+        if e >= 0:
+            target[e] = source[e]
+
+
+@njit(cache=True)
 def _join(
     ends: NDArray[np.uint32], kind: NDArray[np.int8], wanted: int, link: NDArray[np.uint32]
 ) -> int:
@@ -130,9 +141,26 @@ def _join(
     return joined
 
 
-@njit(cache=True)
-def _outside_largest(link: NDArray[np.uint32], size: NDArray[np.int32]) -> int:
-    """Number of voxels that are not in the largest piece."""
+@njit(cache=True, inline="always")  # a call would cost a sixth of the swap
+def _count(
+    ends: NDArray[np.uint32],
+    kind: NDArray[np.int8],
+    doubles: bool,
+    link: NDArray[np.uint32],
+    size: NDArray[np.int32],
+) -> tuple[int, int, int, int]:
+    """Rigid clusters, pieces that single hinges leave and that all joints leave, voxels outside.
+
+    The last are those that are not in the largest piece. `link` and `size` are work space.
+    """
+    count = len(link)
+    for v in range(count):
+        link[v] = v
+    clusters = count - _join(ends, kind, _RIGID, link)
+    singles = clusters - _join(ends, kind, _SINGLE, link)
+    pieces = singles - (_join(ends, kind, _DOUBLE, link) if doubles else 0)
+    if pieces == 1:
+        return clusters, singles, pieces, 0
     size[:] = 0
     most = 0
     for above in link:
@@ -141,7 +169,7 @@ def _outside_largest(link: NDArray[np.uint32], size: NDArray[np.int32]) -> int:
             root = link[root]
         size[root] += 1
         most = max(most, size[root])
-    return len(link) - most
+    return clusters, singles, pieces, count - most
 
 
 @njit(cache=True)
@@ -315,16 +343,12 @@ def anneal_swaps(  # noqa: PLR0912, PLR0915 - one loop, kept whole for speed
     turning = not annealing
     pairs, pair_at = _face_pairs(neighbour)
     ends = pairs[:, :2].astype(np.uint32)
-    kind, kept = np.empty(len(pairs), np.int8), np.empty(12, np.int8)
+    kind = np.empty(len(pairs), np.int8)
     for e in range(len(pairs)):
         a, b = pairs[e, 0], pairs[e, 1]
         kind[e] = _joint_kind(allowed, child_pose, last_single, a, pairs[e, 2], now[a], now[b])
-    for v in range(count):
-        link[v] = v
-    clusters = count - _join(ends, kind, _RIGID, link)
-    singles = clusters - _join(ends, kind, _SINGLE, link)
-    pieces = singles - _join(ends, kind, _DOUBLE, link)
-    outside = _outside_largest(link, size) if pieces > 1 else 0
+    kept = kind.copy()  # `kind` before the swap that is looked at
+    clusters, singles, pieces, outside = _count(ends, kind, doubles, link, size)
     joints = weight * (clusters - 1) + more * (singles - 1)
     left = pieces - 1 + (_torn_pairs(tables, now) if rigid_pairs else 0)
     best, best_left = np.inf, count
@@ -365,11 +389,6 @@ def anneal_swaps(  # noqa: PLR0912, PLR0915 - one loop, kept whole for speed
         now[v] = q
         if w >= 0:
             now[w] = p
-        for f in range(6):
-            e = pair_at[v, f]
-            kept[f] = kind[e] if e >= 0 else 0
-            e = pair_at[w, f] if w >= 0 else -1
-            kept[6 + f] = kind[e] if e >= 0 else 0
         # Taken out, a voxel leaves no fewer clusters and pieces, but for one where it was all
         # alone; put back, it is one more, less its joints. So there are at least so many:
         rigid, joined = _degrees(v, -1, pairs, pair_at, kind)
@@ -392,12 +411,9 @@ def anneal_swaps(  # noqa: PLR0912, PLR0915 - one loop, kept whole for speed
         fresh_joints = 0.0
         penalty = piece_penalty * max(least_pieces - 1, 0)
         if more < 0.0 or fresh + weight * max(least_clusters - 1, 0) + penalty <= limit + _EVEN:
-            for k in range(count):
-                link[k] = k
-            fresh_clusters = count - _join(ends, kind, _RIGID, link)
-            singles = fresh_clusters - _join(ends, kind, _SINGLE, link)
-            fresh_pieces = singles - (_join(ends, kind, _DOUBLE, link) if doubles else 0)
-            fresh_outside = _outside_largest(link, size) if fresh_pieces > 1 else 0
+            fresh_clusters, singles, fresh_pieces, fresh_outside = _count(
+                ends, kind, doubles, link, size
+            )
             fresh_joints = weight * (fresh_clusters - 1) + more * (singles - 1)
             fresh_left = fresh_pieces - 1
             extra = piece_penalty * _OUTSIDE * fresh_outside if annealing else 0.0
@@ -411,14 +427,12 @@ def anneal_swaps(  # noqa: PLR0912, PLR0915 - one loop, kept whole for speed
             now[v] = before
             if w >= 0:
                 now[w] = other
-            for f in range(6):
-                e = pair_at[v, f]
-                if e >= 0:
-                    kind[e] = kept[f]
-                e = pair_at[w, f] if w >= 0 else -1
-                if e >= 0:
-                    kind[e] = kept[6 + f]
+                _copy_kinds(w, pair_at, kept, kind)
+            _copy_kinds(v, pair_at, kept, kind)
             continue
+        _copy_kinds(v, pair_at, kind, kept)
+        if w >= 0:
+            _copy_kinds(w, pair_at, kind, kept)
         clusters, pieces = fresh_clusters, fresh_pieces
         surface, joints, left, outside = fresh, fresh_joints, fresh_left, fresh_outside
         occupant[before // 24] = w

@@ -3,10 +3,11 @@
 :func:`solve` runs one seed. Simulated annealing over sets of poses lowers the energy, each step a
 large-neighbourhood move. Of several sets of poses that were grown the best is the start. It settles
 first: energy and hinges that cannot move go down together, judged by the closure test alone, which
-costs little. Phase A asks the planner too, with a penalty for what does not fold yet, until a tree
-folds. Phase B anneals among trees that fold; then the best one is shaken, settles and folds again,
-until that no longer pays. Threshold acceptance with an exponential random number is the same as
-the Metropolis rule.
+costs little; the planner is asked now and then whether what is there folds. Where nothing did,
+phase A asks it at every step, with a penalty for what does not fold yet, until a tree folds. Phase
+B anneals among trees that fold; then the best one is shaken, settles and folds again, until that
+no longer pays. Threshold acceptance with an exponential random number is the same as the
+Metropolis rule.
 """
 
 from __future__ import annotations
