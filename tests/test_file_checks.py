@@ -12,6 +12,7 @@ from fabfold.cli.app import app
 from fabfold.errors import ModelError
 from fabfold.printing.file_checks import check_file, parts_of
 from fabfold.printing.profiles import load_profile
+from fabfold.printing.standing import stands_over
 from fabfold.progress import SilentProgress
 
 PLA = load_profile("fdm-pla-0.4")
@@ -99,6 +100,18 @@ def test_what_lies_hangs_and_topples(tmp_path):
     assert found["stands by itself"].figure == 0.0
     floating = checked(written(tmp_path, cube((0, 0, 0), (5, 5, 5)), cube((9, 0, 3), (14, 5, 9))))
     assert "part-01 begin in the air" in floating["contact with the plate"].note
+
+
+def test_a_centre_of_mass_is_over_the_outline_of_what_touches_or_beside_it():
+    turn = np.linspace(0.0, 2.0 * np.pi, 2000, endpoint=False)
+    ring = 10.0 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    centre = lambda x: np.array([x, 0.0, 5.0])  # noqa: E731
+    assert stands_over(centre(0.0), ring)
+    assert stands_over(centre(9.9999), ring)
+    assert not stands_over(centre(10.0001), ring)
+    assert not stands_over(centre(0.0), ring[:2])
+    line = np.stack([np.arange(-3.0, 4.0), np.zeros(7)], axis=1)
+    assert not stands_over(centre(0.0), line), "what touches in a line spans no area"
 
 
 def test_a_file_that_is_too_large_is_told_the_scale_that_fits(tmp_path):

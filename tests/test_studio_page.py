@@ -93,6 +93,21 @@ def coloured(pixels: np.ndarray) -> int:
     return int((pixels.max(axis=2) - pixels.min(axis=2) > 40).sum())
 
 
+def middle(pixels: np.ndarray, left_half: bool = False) -> tuple[int, int]:
+    """Place (x, y) of the coloured pixel nearest to the middle of all, or of those to the left."""
+    # Five more around it are coloured too: no edge and no gap between two bodies.
+    found = pixels.max(axis=2) - pixels.min(axis=2) > 40
+    inner = np.minimum.reduce(
+        [np.roll(found, (i, j), (0, 1)) for i in range(-5, 6) for j in range(-5, 6)]
+    )
+    rows, columns = np.nonzero(inner)
+    if left_half:
+        keep = columns < np.median(columns)
+        rows, columns = rows[keep], columns[keep]
+    away = np.hypot(rows - np.median(rows), columns - np.median(columns))
+    return int(columns[away.argmin()]), int(rows[away.argmin()])
+
+
 def press(page: Any, name: str) -> None:
     page.get_by_role("button", name=name, exact=True).click()
 
@@ -114,8 +129,7 @@ def test_it_is_scrubbed_and_stepped_and_bodies_are_clicked(studio: Any) -> None:
     again = picture(page, lambda now: changed(now, closed) < 500)
     assert changed(again, closed) < 500
     # A click in the middle of the bar meets a body, and greys the others.
-    rows, columns = np.nonzero(closed.max(axis=2) - closed.min(axis=2) > 40)
-    page.mouse.click(int(np.median(columns)), int(np.median(rows)))
+    page.mouse.click(*middle(closed))
     page.get_by_text(re.compile(r"body-\d\d: \d voxels, voxel \d clicked")).wait_for(
         timeout=WAIT_MS
     )
@@ -162,20 +176,20 @@ def test_a_grid_is_placed_by_hand_and_searched(studio: Any) -> None:
 def test_forces_fold_it_with_a_persons_help(studio: Any) -> None:
     page, folder, _ = studio
     before = open_kit(str(folder)).fold().motion
+    kit = picture(page, is_drawn)
     tab(page, "Force")
     press(page, "Begin")
     press(page, "Forces")
     page.get_by_text("0 actions; A and B are up to 180° apart").wait_for(timeout=WAIT_MS)
-    shown = picture(page, lambda now: coloured(now) > 1_000)
-    rows, columns = np.nonzero(shown.max(axis=2) - shown.min(axis=2) > 40)
-    left = columns < np.median(columns)
-    page.mouse.click(int(np.median(columns[left])), int(np.median(rows[left])))
+    shown = picture(page, lambda now: coloured(now) > 1_000 and changed(now, kit) > 5_000)
+    x, y = middle(shown, left_half=True)
+    page.mouse.click(x, y)
     page.get_by_text(re.compile(r"Voxel \d of A chosen")).wait_for(timeout=WAIT_MS)
     # A drag pulls at once, and is recorded.
-    page.mouse.move(int(np.median(columns[left])), int(np.median(rows[left])))
+    page.mouse.move(x, y)
     page.mouse.down()
     for step in range(1, 9):
-        page.mouse.move(int(np.median(columns[left])), int(np.median(rows[left])) - 12 * step)
+        page.mouse.move(x, y - 12 * step)
         page.wait_for_timeout(150)
     page.mouse.up()
     page.get_by_text("Pulling: done.").wait_for(timeout=WAIT_MS)

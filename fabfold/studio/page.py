@@ -35,6 +35,9 @@ __all__ = ["StudioPage"]
 #: Views of the scene, and what is seen in each.
 _VIEWS = ("Kit", "Model", "Grid", "Forces")
 
+#: Light from all around beside viser's lamps.
+_SKY = 2.0
+
 #: Where one looks from.
 _CAMERA = (6.5, -7.5, 5.5)
 
@@ -68,6 +71,11 @@ class StudioPage:
         server.scene.set_up_direction("+z")
         # Shadows of tens of thousands of triangles cost more than all the rest of a picture.
         server.scene.configure_default_lights(enabled=True, cast_shadow=False)
+        # A map of surroundings to light bodies takes four seconds to make without a graphics card.
+        server.scene.configure_environment_map(None)
+        server.scene.add_light_hemisphere(
+            "/sky", sky_color=(255, 255, 255), ground_color=(205, 205, 215), intensity=_SKY
+        )
         server.initial_camera.position = _CAMERA
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         self.tasks = PageTasks(server)
