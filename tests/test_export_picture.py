@@ -18,7 +18,7 @@ from fabfold.errors import RecipeError
 from fabfold.export.camera import View
 from fabfold.export.colours import body_colours
 from fabfold.export.kit_picture import halfway, picture_of_kit, strip, write_strip
-from fabfold.export.render import png_bytes, render
+from fabfold.export.render import _whole_pixels, png_bytes, render
 from fabfold.fold.motion import Motion
 
 SMALL = View(size=(120, 90), samples=1, lights=6)
@@ -54,6 +54,31 @@ def test_a_wide_block_fills_the_width():
     assert columns.min() == pytest.approx(15, abs=2)
     assert columns.max() == pytest.approx(284, abs=2)
     assert rows.min() > 0 and rows.max() < 99
+
+
+@pytest.mark.parametrize("samples", [2, 3])
+def test_light_found_once_a_pixel_is_that_of_its_samples(monkeypatch, samples):
+    meshes = [_mesh(m3.Manifold.sphere(5, 64)), _mesh(m3.Manifold.cube((9, 3, 3), True))]
+    colours = np.array([[220, 40, 40], [40, 90, 220]], np.uint8)
+    view = View(size=(160, 120), samples=samples, lights=8)
+    wholes = []
+
+    def whole_pixels(*arguments):
+        wholes.append(_whole_pixels(*arguments))
+        return wholes[-1]
+
+    monkeypatch.setattr("fabfold.export.render._whole_pixels", whole_pixels)
+    once = render(meshes, colours, view=view).astype(int)
+    model = _inked(once)
+    assert (wholes[0] & ~model).sum() == 0
+    assert 0.6 < wholes[0].sum() / model.sum() < 1.0, "all but outlines and creases"
+    none = lambda triangle, *_: np.zeros([side // samples for side in triangle.shape], bool)  # noqa: E731
+    monkeypatch.setattr("fabfold.export.render._whole_pixels", none)
+    each = render(meshes, colours, view=view).astype(int)
+    apart = np.abs(once - each).max(axis=2)
+    assert apart[~wholes[0]].max() == 0
+    assert apart.mean() < 0.5
+    assert (apart > 20).sum() < 0.01 * model.sum(), "where the rim of a shadow crosses a pixel"
 
 
 def test_the_nearer_mesh_hides_the_farther():

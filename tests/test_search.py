@@ -15,6 +15,7 @@ from tree_cases import solid_problem, strip
 
 from fabfold.errors import NoTreeError, RecipeError, WorkerError
 from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.search.processes import ProcessExecutor
 from fabfold.search.run import executor, run_seeds, search
 from fabfold.search.seeds import Job, SeedResult
 from fabfold.tree.effort import EFFORTS
@@ -48,6 +49,31 @@ def test_best_first_from_every_seed(alone):
 def test_the_number_of_workers_changes_nothing(problem, alone):
     together = search(problem, range(4), LatticeFoldability(), EFFORT, workers=2)
     assert key(together) == key(alone)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seconds", [60.0, 0.0])
+def test_workers_that_stood_by_take_the_seeds_or_new_ones_do(problem, alone, seconds):
+    pool = ProcessExecutor(1)
+    pool.stand_by("S", seconds)
+    (waiting,) = multiprocessing.active_children()
+    first = waiting.pid
+    if seconds == 0.0:
+        waiting.join(60)
+        assert not waiting.is_alive(), "nobody sent a seed in time"
+    ran, heard = set(), Results()
+
+    def on_event(event):
+        ran.update(process.pid for process in multiprocessing.active_children())
+        heard.on_event(event)
+
+    job = Job(problem, LatticeFoldability(), EFFORT)
+    with executor(1, None, 4, lambda: False, pool) as ready:
+        assert ready is pool
+        run_seeds(ready, ((seed, job) for seed in range(4)), on_event, lambda: False)
+    assert (ran == {first}) == (seconds > 0.0)
+    found = [c for seed in range(4) for c in heard.done[seed].candidates]
+    assert key(sorted(found, key=lambda c: c.energy["total"])) == key(alone)
 
 
 @pytest.mark.slow

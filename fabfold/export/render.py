@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,11 @@ __all__ = ["Image", "Mesh", "jpeg_bytes", "png_bytes", "posed_points", "render",
 Image = NDArray[np.uint8]
 #: Vertices (v, 3) and triangles (f, 3) of a mesh.
 Mesh = tuple[NDArray[np.floating], NDArray[np.int32]]
+
+#: Share of its depth by which a surface is cut off and another one begins.
+_STEP = 0.004
+#: Cosine of the most by which normals within a pixel differ where it is lit as one.
+_TURN = 0.97
 
 
 def _lines(
@@ -44,7 +51,7 @@ def _lines(
         turn = np.einsum("ijk,ijk->ij", normals[one], normals[two])
         both = (body[one] >= 0) & (body[two] >= 0)
         line = np.where(both & (turn < 0.85), 0.35, 0.0)
-        line = np.where(both & (step > 0.004), 0.7, line)
+        line = np.where(both & (step > _STEP), 0.7, line)
         line = np.where(body[one] != body[two], np.where(both, 0.7, 1.0), line)
         nearer = near[one] >= near[two]
         strength[one] = np.maximum(strength[one], np.where(nearer, line, 0.0))
@@ -110,32 +117,75 @@ def render(
     window = np.s_[:, :] if view.ground else _window(triangle, samples)
     near, triangle, points, facing = near[window], triangle[window], points[window], facing[window]
     covered = triangle >= 0
-    places, directions = points[covered], facing[covered]
+    whole = _whole_pixels(triangle, near, facing, owner, samples)
+    parts = covered & ~np.repeat(np.repeat(whole, samples, axis=0), samples, axis=1)
+    places = np.concatenate([_mean(points, whole, samples), points[parts]])
+    directions = np.concatenate([_mean(facing, whole, samples), facing[parts]])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     floor = ShadowFloor(vertices, camera, view) if view.ground else None
-    if floor is not None:
-        places = np.concatenate([places, floor.points])
-        directions = np.concatenate([directions, floor.normals])
-    light = light_at(places, directions, vertices, corners, view)
     image = np.empty((*triangle.shape, 3), dtype=np.float32)
     image[:] = linear_light(view.background)
-    on_model = int(covered.sum())
+    on_model = len(places)
+    lit_places, lit_directions = places, directions
+    if floor is not None:
+        lit_places = np.concatenate([places, floor.points])
+        lit_directions = np.concatenate([directions, floor.normals])
+    light = light_at(lit_places, lit_directions, vertices, corners, view)
     if floor is not None:
         shadow = floor.darkened(light[on_model:])
         image *= np.repeat(np.repeat(shadow, samples, axis=0), samples, axis=1)[..., None]
     paint = linear_light(colours)[owner]
-    image[covered] = _painted(
-        paint[triangle[covered]], light[:on_model], points[covered], facing[covered], camera, view
-    )
+    seen_of = np.concatenate([triangle[::samples, ::samples][whole], triangle[parts]])
+    painted = _painted(paint[seen_of], light[:on_model], places, directions, camera, view)
+    count = int(whole.sum())
+    for part in _places(image, samples):
+        part[whole] = painted[:count]
+    image[parts] = painted[count:]
     lines = _lines(triangle, near, facing * covered[..., None], owner)
     image *= (1.0 - view.edges * lines)[..., None]
-    rows, columns = (side // samples for side in triangle.shape)
-    seen = image.reshape(rows, samples, columns, samples, 3).mean(axis=(1, 3))
+    parts_of_pixel = _places(image, samples)
+    seen = sum(parts_of_pixel[1:], parts_of_pixel[0]) / np.float32(samples**2)
+    rows, columns = whole.shape
     width, height = view.size
-    whole = np.empty((height, width, 3), dtype=np.float32)
-    whole[:] = linear_light(view.background)
+    sheet = np.empty((height, width, 3), dtype=np.float32)
+    sheet[:] = linear_light(view.background)
     top, left = ((part.start or 0) // samples for part in window)
-    whole[top : top + rows, left : left + columns] = seen
-    return bytes_of_light(whole)
+    sheet[top : top + rows, left : left + columns] = seen
+    return bytes_of_light(sheet)
+
+
+def _places(samples: NDArray[Any], each: int) -> list[NDArray[Any]]:
+    """The samples of all pixels by their place in the pixel: `each` ² views of a picture's size."""
+    return [samples[i::each, j::each] for i in range(each) for j in range(each)]
+
+
+def _mean(values: NDArray[np.float32], wanted: NDArray[np.bool_], each: int) -> NDArray[np.float32]:
+    """Mean of the samples of some pixels, (n, 3)."""
+    parts = [part[wanted] for part in _places(values, each)]
+    return np.asarray(sum(parts[1:], parts[0]) / np.float32(len(parts)))
+
+
+def _whole_pixels(
+    triangle: NDArray[np.int32],
+    near: NDArray[np.float32],
+    facing: NDArray[np.float32],
+    owner: NDArray[np.int32],
+    each: int,
+) -> NDArray[np.bool_]:
+    """Pixels whose samples all see one smooth stretch of one body: their light is found once."""
+    bodies = _places(np.where(triangle >= 0, owner[triangle], -1), each)
+    depths, normals = _places(near, each), _places(facing, each)
+    found = bodies[0] >= 0
+    for body in bodies[1:]:
+        found &= body == bodies[0]
+    nearest = reduce(np.maximum, depths)
+    found &= nearest - reduce(np.minimum, depths) <= _STEP * nearest
+    first = normals[0][found]
+    smooth = np.ones(len(first), dtype=np.bool_)
+    for normal in normals[1:]:
+        smooth &= np.einsum("ij,ij->i", normal[found], first) > _TURN
+    found[found] = smooth
+    return found
 
 
 def _window(triangle: NDArray[np.int32], samples: int) -> tuple[slice, slice]:

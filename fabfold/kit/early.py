@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 from fabfold.child_process import end_with_parent, module_call
@@ -20,6 +21,9 @@ from fabfold.search.rounds import Found
 from fabfold.tree.bound import closed_share
 
 __all__ = ["EarlyKit", "write_early"]
+
+#: What takes long to load, loaded while there is no tree yet.
+_NEEDED = ("fabfold.kit.writing", "manifold3d", "pymeshlab")
 
 
 class EarlyKit:
@@ -62,15 +66,30 @@ class EarlyKit:
         self._thread.start()
 
     def __enter__(self) -> EarlyKit:
+        """Start the process, which loads what it needs before there is a tree."""
+        if not (self._folder / "tree.json").is_file():
+            self._process = self._open()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Give up what the final kit replaces; where none will come, wait until it is written."""
-        if kind is None:
+        if kind is None or self._thread is None:
             self._over = True
             if self._process is not None:
                 self._process.terminate()
+                if self._thread is None:
+                    self._process.communicate()
         self.wait()
+
+    def _open(self) -> subprocess.Popen[bytes]:
+        command, environment = module_call("fabfold.kit.early")
+        return subprocess.Popen(
+            command,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+        )
 
     def wait(self) -> None:
         """Wait until nothing is written any more."""
@@ -79,15 +98,8 @@ class EarlyKit:
 
     def _make(self, planned: PlannedTree) -> None:
         work = pickle.dumps((planned, self._mode, self._recipe, self._folder))
-        command, environment = module_call("fabfold.kit.early")
         with self._listener.stage("early") as progress:
-            process = self._process = subprocess.Popen(
-                command,
-                env=environment,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.PIPE,
-            )
+            process = self._process = self._process or self._open()
             if self._over:
                 process.terminate()
             _, said = process.communicate(work)
@@ -129,5 +141,7 @@ def write_early(work: bytes, before_writing: Callable[[], object] = lambda: None
 if __name__ == "__main__":
     end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    for name in _NEEDED:
+        import_module(name)
     # Given up before it writes anything, or not at all: there are no half-written kits.
     write_early(sys.stdin.buffer.read(), lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN))

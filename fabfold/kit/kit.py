@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -31,9 +32,9 @@ if TYPE_CHECKING:
     from fabfold.kit.early import EarlyKit
     from fabfold.printing.checks import Check
     from fabfold.printing.print_mode import PrintMode
-    from fabfold.search.kernels import KernelCompiler
     from fabfold.search.pareto import Solution
     from fabfold.search.rounds import Found, Rounds
+    from fabfold.search.standby import SearchStandby
     from fabfold.solid.closed_solid import Solid
     from fabfold.tree.candidate import Candidate
     from fabfold.voxels.thickening import Cut
@@ -96,7 +97,7 @@ class Kit(StageRunner):
         #: Told of each better tree that a search finds, with its voxels.
         self.on_better: Callable[[Found], None] | None = None
         self._early: EarlyKit | None = None
-        self._compiler: KernelCompiler | None = None
+        self._standby: SearchStandby | None = None
         self._files = {"model": model, "template": template, "actions": actions}
         self._template: Template = load_target(recipe.template, template, recipe.template_cells)
         if recipe.joints_inside:
@@ -275,6 +276,7 @@ class Kit(StageRunner):
         from fabfold.kit.writing import write_kit
 
         mode = self.print_mode()
+        self._stand_by()
         self.cut_solid()  # Before anything in the folder changes.
         store.take()
         with recorded_export(store, target, self.recipe.name):
@@ -334,7 +336,7 @@ class Kit(StageRunner):
     @property
     def kernel_seconds(self) -> float:
         """Processor seconds that compiling the search's kernels took; part of the fit stage's."""
-        return 0.0 if self._compiler is None else self._compiler.processor_seconds
+        return 0.0 if self._standby is None else self._standby.kernel_seconds
 
     def _keep_inputs(self, store: StageStore) -> None:
         """Copy the files that the recipe names."""
@@ -345,13 +347,9 @@ class Kit(StageRunner):
                 store.keep(file, digest, name)
 
     def _rounds(self) -> Rounds:
-        if "rounds" not in self._results:
-            first = None if self._early is None else self._early.start
-            self._results["rounds"] = self._rounds_of(
-                self.recipe, seconds=self.seconds, on_first=first
-            )
-        result: Rounds = self._results["rounds"]
-        return result
+        first = None if self._early is None else self._early.start
+        make = partial(self._rounds_of, self.recipe, seconds=self.seconds, on_first=first)
+        return self._once("rounds", make)
 
     def _rounds_of(
         self,
@@ -361,13 +359,9 @@ class Kit(StageRunner):
         on_first: Callable[[Found], None] | None = None,
     ) -> Rounds:
         """Search of the kit's voxelizations for its recipe, or one with another preference."""
-        from fabfold.search.kernels import KernelCompiler
         from fabfold.search.rounds import Rounds
 
-        # With one worker everything happens in this process, and what is called is compiled.
-        if self._compiler is None and self.workers != 1 and self.scheduler is None:
-            self._compiler = KernelCompiler()
-            self._compiler.start()
+        self._stand_by()
         return Rounds(
             recipe,
             self._template,
@@ -382,8 +376,17 @@ class Kit(StageRunner):
             shift=shift,
             on_first=on_first,
             on_better=self.on_better,
-            compiler=self._compiler,
+            standby=self._standby,
         )
+
+    def _stand_by(self) -> None:
+        from fabfold.search.standby import SearchStandby
+
+        # With one worker all happens in this process, and what is called is compiled.
+        if self._standby is None and self.workers != 1 and self.scheduler is None:
+            cut = self._is_done("voxelize", keys.voxels_key(self.recipe, self._template))
+            self._standby = SearchStandby(self.workers, self.recipe.joints)
+            self._standby.start(workers=not cut)
 
     def _mark(self) -> list[Any]:
         return [] if self.recipe.pick else self._rounds().mark()

@@ -70,10 +70,10 @@ class KernelCompiler:
         self._running: list[subprocess.Popen[bytes]] = []
         self.processor_seconds = 0.0
 
-    def start(self) -> None:
-        """Begin, unless the kernels are there or it has begun already."""
+    def start(self) -> bool:
+        """Begin, unless the kernels are there or it has begun already; whether there is work."""
         if self._running or self._stamp.exists():
-            return
+            return bool(self._running)
         atexit.register(self.close)  # where the run ends before the search begins
         for half in HALVES:
             command, environment = module_call("fabfold.search.kernels", half)
@@ -84,6 +84,7 @@ class KernelCompiler:
                     command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
                 )
             )
+        return True
 
     def wait(self, progress: Progress) -> None:
         """Wait until all is compiled.

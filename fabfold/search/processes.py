@@ -14,12 +14,19 @@ from multiprocessing.process import BaseProcess
 
 from fabfold.child_process import end_with_parent, safe_path
 from fabfold.search.seeds import Better, Done, Event, Job, Lost, run_seed
+from fabfold.search.warmup import warm_up_job
 from fabfold.tree.candidate import Candidate
+from fabfold.tree.catalogue import JointSet
 
 __all__ = ["InProcessExecutor", "ProcessExecutor"]
 
 #: Seconds that a worker has to end by itself before it is killed.
 PATIENCE = 5.0
+#: Seconds that a worker on standby waits for its first seed before it ends.
+STANDBY = 60.0
+#: How much other processes go before workers, as of nice(1): a first kit is built beside them, and
+#: people use the machine.
+_NICE = 5
 
 
 class InProcessExecutor:
@@ -86,6 +93,19 @@ class ProcessExecutor:
         self._count = count
         self._workers: list[_Worker] = []
 
+    def stand_by(self, joints: JointSet, seconds: float = STANDBY) -> None:
+        """Start all workers now, so that they have loaded the kernels when there are seeds.
+
+        Parameters
+        ----------
+        joints : str
+            Joint types of the search to come.
+        seconds : float
+            Those that get no seed for so long end by themselves.
+        """
+        while len(self._workers) < self._count:
+            self._start((joints, seconds))
+
     def free(self) -> int:
         """Seeds that can be taken now."""
         return self._count - sum(worker.seed is not None for worker in self._workers)
@@ -105,10 +125,12 @@ class ProcessExecutor:
             worker.seed = seed
             return
 
-    def _start(self) -> _Worker:
+    def _start(self, standby: tuple[JointSet, float] | None = None) -> _Worker:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        process = context.Process(target=_serve, args=(theirs,), name="fabfold-seed", daemon=True)
+        process = context.Process(
+            target=_serve, args=(theirs, standby), name="fabfold-seed", daemon=True
+        )
         with _stops_held(), safe_path():
             process.start()
         theirs.close()
@@ -203,12 +225,19 @@ def _stops_held() -> Iterator[None]:
             signal.raise_signal(asked[0])
 
 
-def _serve(connection: Connection) -> None:
+def _serve(connection: Connection, standby: tuple[JointSet, float] | None) -> None:
     """Run seeds as they come, until the parent closes the pipe or is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     caller = multiprocessing.parent_process()
     end_with_parent(None if caller is None else caller.pid)
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
+    if standby is not None:
+        joints, seconds = standby
+        run_seed(warm_up_job(joints), 1, lambda _: None, lambda: False)
+        if not connection.poll(seconds):
+            return
 
     def stop() -> bool:
         if not connection.poll():

@@ -15,11 +15,11 @@ from fabfold.lattice.template import Template
 from fabfold.progress import Progress
 from fabfold.recipe.recipe import Recipe
 from fabfold.recipe.recipe_wishes import wished
-from fabfold.search.kernels import KernelCompiler
 from fabfold.search.run import Budget, Tally, executor, require_fit, run_seeds, warm_up
 from fabfold.search.saved import SeedCache
 from fabfold.search.schedule import SEEDS_PER_ROUND, Rung, SeedTask, schedule
 from fabfold.search.seeds import Batch, Event, Executor, Job, SeedResult
+from fabfold.search.standby import SearchStandby
 from fabfold.search.voxelization_problems import VoxelizationProblems
 from fabfold.store import StageStore, stage_key
 from fabfold.tree.bound import closed_share
@@ -34,8 +34,6 @@ __all__ = ["Found", "Rounds"]
 #: Distance of the search's first seeds for recipe seeds that follow each other: more than
 #: any recipe's rounds use, so that two recipes share none.
 SEED_STRIDE = 1_000_000
-
-
 #: A tree that folds, and the voxels that it joins.
 Found = tuple[Voxels, Candidate]
 
@@ -72,8 +70,8 @@ class Rounds:
         Told of the first tree that folds, with its voxels, as soon as its rung is done.
     on_better : callable, optional
         Told of each tree that is better than all before, with its voxels, as soon as it is known.
-    compiler : KernelCompiler, optional
-        Compiles the kernels beside what comes before; the search waits for it.
+    standby : SearchStandby, optional
+        Kernels and workers that were made ready beside what comes before.
     """
 
     def __init__(
@@ -92,7 +90,7 @@ class Rounds:
         shift: int = 0,
         on_first: Callable[[Found], None] | None = None,
         on_better: Callable[[Found], None] | None = None,
-        compiler: KernelCompiler | None = None,
+        standby: SearchStandby | None = None,
     ) -> None:
         self.recipe = recipe
         self.template = template
@@ -107,7 +105,7 @@ class Rounds:
         self._open_progress = open_progress
         self._on_first = on_first
         self._on_better = on_better
-        self._compiler = compiler
+        self._standby = standby
         self._option_of: dict[int, int] = {}
         self._origin: dict[int, int] = {}
         self._done: dict[int, list[Found]] = {}
@@ -242,7 +240,7 @@ class Rounds:
             self.wait_for_kernels(progress)
             budget = Budget(seconds)
             tally = Tally(progress, {}, lambda _done: budget.share, describe=self.describe)
-            with executor(self.workers, self.scheduler, rounds, budget.over) as pool:
+            with self._executor(rounds, budget.over) as pool:
                 progress.update(None, "getting ready")
                 warm_up(pool, self.recipe.joints)
                 budget.restart()
@@ -255,9 +253,13 @@ class Rounds:
         return results
 
     def wait_for_kernels(self, progress: Progress) -> None:
-        """Wait until the kernels are compiled, where that goes on beside."""
-        if self._compiler is not None:
-            self._compiler.wait(progress)
+        """Wait until the kernels are compiled."""
+        if self._standby is not None:
+            self._standby.wait(progress)
+
+    def _executor(self, seeds: int, over: Callable[[], bool]) -> AbstractContextManager[Executor]:
+        ready = None if self._standby is None else self._standby.take()
+        return executor(self.workers, self.scheduler, seeds, over, ready)
 
     def _searchable(self, results: Mapping[int, SeedResult]) -> bool:
         """Whether any voxelization that was looked at can be searched at all."""
@@ -275,7 +277,7 @@ class Rounds:
                 total = sum(rung.seeds for rung in self._rungs(number))
                 tally = Tally(progress, {}, lambda done: done / total, total, self.describe)
                 forever = Budget()
-                with executor(self.workers, self.scheduler, total, forever.over) as pool:
+                with self._executor(total, forever.over) as pool:
                     results = self._search_round(number, pool, tally, forever)
                 tally.check_failures()
         require_fit([results[seed] for seed in sorted(results)])

@@ -76,7 +76,11 @@ class Budget:
 
 @contextmanager
 def executor(
-    workers: int | None, scheduler: str | None, seeds: int, over: Callable[[], bool]
+    workers: int | None,
+    scheduler: str | None,
+    seeds: int,
+    over: Callable[[], bool],
+    ready: Executor | None = None,
 ) -> Iterator[Executor]:
     """Open what runs the seeds; nothing runs any more when the context closes.
 
@@ -91,6 +95,8 @@ def executor(
         Seeds that there may be to run.
     over : callable
         Whether the seeds that run shall end.
+    ready : Executor, optional
+        Taken where it is given: processes that were started beside what came before.
 
     Raises
     ------
@@ -100,7 +106,9 @@ def executor(
     opened: Executor
     if workers is not None and workers < 1:
         raise RecipeError(f"--workers {workers}: there must be at least one")
-    if scheduler is not None:
+    if ready is not None:
+        opened = ready
+    elif scheduler is not None:
         from fabfold.search.dask import DaskExecutor
 
         opened = DaskExecutor(scheduler)
