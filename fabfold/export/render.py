@@ -120,8 +120,9 @@ def render(
     whole = _whole_pixels(triangle, near, facing, owner, samples)
     parts = covered & ~np.repeat(np.repeat(whole, samples, axis=0), samples, axis=1)
     places = np.concatenate([_mean(points, whole, samples), points[parts]])
-    directions = np.concatenate([_mean(facing, whole, samples), facing[parts]])
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    mean = _mean(facing, whole, samples)
+    mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+    directions = np.concatenate([mean, facing[parts]])
     floor = ShadowFloor(vertices, camera, view) if view.ground else None
     image = np.empty((*triangle.shape, 3), dtype=np.float32)
     image[:] = linear_light(view.background)
