@@ -120,53 +120,48 @@ def _placed(mesh: Mesh, pose: F64) -> F64:
     return np.asarray(mesh[0], dtype=float) @ pose[:3, :3].T + pose[:3, 3]
 
 
-class _Group:
-    """Some bodies as one mesh of FCL."""
+class _FclBody:
+    """A body as a mesh of FCL, and the box around it in shape A."""
 
-    def __init__(self, names: Sequence[str], meshes: Mapping[str, Mesh], poses: Poses) -> None:
+    def __init__(self, mesh: Mesh) -> None:
         import fcl
 
-        self.names = list(names)
-        vertices = [_placed(meshes[name], poses[name]) for name in names]
-        starts = np.cumsum([0] + [len(v) for v in vertices])
-        faces = [np.asarray(meshes[n][1]) + s for n, s in zip(names, starts, strict=False)]
-        self._ends = np.cumsum([len(f) for f in faces])
+        vertices, faces = np.asarray(mesh[0], dtype=float), np.asarray(mesh[1])
         model = fcl.BVHModel()
-        model.beginModel(int(starts[-1]), int(self._ends[-1]))
-        model.addSubModel(np.concatenate(vertices), np.concatenate(faces))
+        model.beginModel(len(vertices), len(faces))
+        model.addSubModel(vertices, faces)
         model.endModel()
         self.thing = fcl.CollisionObject(model)
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        self.middle, self.half = (low + high) / 2, (high - low) / 2
 
-    def turn(self, pose: F64) -> None:
-        """Move the bodies by a transform, from where they were put at first."""
+    def put(self, pose: F64) -> None:
+        """Move the body by a transform, from its place in shape A."""
         import fcl
 
         self.thing.setTransform(fcl.Transform(pose[:3, :3], pose[:3, 3]))
 
-    def owner(self, triangle: int) -> str:
-        """Body that a triangle belongs to."""
-        return self.names[int(np.searchsorted(self._ends, triangle, side="right"))]
 
+class _Placed:
+    """Some bodies where transforms put them, with boxes that hold them there."""
 
-def _collision(one: _Group, two: _Group) -> str | None:
-    """Two bodies that collide, if any do."""
-    import fcl
+    def __init__(self, bodies: Mapping[str, _FclBody], poses: Poses) -> None:
+        self.names = list(poses)
+        self.poses = poses
+        turns = np.array([pose[:3, :3] for pose in poses.values()])
+        moves = np.array([pose[:3, 3] for pose in poses.values()])
+        middles = np.array([bodies[name].middle for name in self.names])
+        halves = np.array([bodies[name].half for name in self.names])
+        middle = np.einsum("bij,bj->bi", turns, middles) + moves
+        half = np.einsum("bij,bj->bi", np.abs(turns), halves)
+        self.low, self.high = middle - half, middle + half
 
-    result = fcl.CollisionResult()
-    request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=True)
-    if not fcl.collide(one.thing, two.thing, request, result):
-        return None
-    contact = result.contacts[0]
-    return f"{one.owner(contact.b1)} and {two.owner(contact.b2)}"
-
-
-def _distance(one: _Group, two: _Group) -> tuple[float, str]:
-    """Distance of two groups, and the two bodies nearest to each other."""
-    import fcl
-
-    result = fcl.DistanceResult()
-    value = fcl.distance(one.thing, two.thing, fcl.DistanceRequest(), result)
-    return max(0.0, float(value)), f"{one.owner(result.b1)} and {two.owner(result.b2)}"
+    def apart(self, other: _Placed) -> F64:
+        """Distances between the boxes of these and of others, (b, c)."""
+        away = np.maximum(
+            self.low[:, None] - other.high[None, :], other.low[None, :] - self.high[:, None]
+        )
+        return np.asarray(np.linalg.norm(np.maximum(away, 0.0), axis=2))
 
 
 def _overlap(meshes: Mapping[str, Mesh], poses: Poses) -> float:
@@ -187,46 +182,52 @@ def _overlap(meshes: Mapping[str, Mesh], poses: Poses) -> float:
 
 
 class _Sightings:
-    """What was seen so far."""
+    """What was seen so far of some bodies."""
 
-    def __init__(self) -> None:
+    def __init__(self, bodies: Mapping[str, _FclBody]) -> None:
+        self.bodies = bodies
         self.least = math.inf
         self.where = ""
         self.hits: list[str] = []
         self.poses = 0
 
-    def see(self, one: _Group, two: _Group, where: str, measure: bool) -> bool:
-        """Look at one pose; False where bodies collide."""
+    def see(self, ones: _Placed, others: _Placed, apart: F64, where: str, measure: bool) -> bool:
+        """Look at pairs of bodies in one pose; False where two collide.
+
+        `others` have been put there. Boxes that are `apart` rule out that two collide, or are
+        nearer than the nearest so far.
+        """
+        import fcl
+
         self.poses += 1
-        pair = _collision(one, two)
-        if pair is not None:
-            self.hits.append(f"{where}: {pair}")
-            self.least, self.where = 0.0, self.hits[0]
-            return False
-        if measure:
-            gap, pair = _distance(one, two)
+        reach = self.least if measure else 0.0
+        near = np.argwhere(apart <= reach)
+        near = near[np.argsort(apart[near[:, 0], near[:, 1]], kind="stable")]
+        for i in np.unique(near[:, 0]).tolist():
+            self.bodies[ones.names[i]].put(ones.poses[ones.names[i]])
+        pairs = [(ones.names[i], others.names[j], apart[i, j]) for i, j in near.tolist()]
+        for one, two, away in pairs:
+            if away <= 0.0 and fcl.collide(self.bodies[one].thing, self.bodies[two].thing):
+                self.hits.append(f"{where}: {one} and {two}")
+                self.least, self.where = 0.0, self.hits[0]
+                return False
+        for one, two, away in pairs if measure else []:
+            if away >= self.least:
+                break
+            gap = max(0.0, float(fcl.distance(self.bodies[one].thing, self.bodies[two].thing)))
             if gap < self.least:
-                self.least, self.where = gap, f"{where}: {pair}"
+                self.least, self.where = gap, f"{where}: {one} and {two}"
         return True
 
 
-def _boxes_apart(one: F64, two: F64) -> float:
-    """Distance of the bounding boxes of two sets of points."""
-    low = np.maximum(one.min(axis=0), two.min(axis=0))
-    high = np.minimum(one.max(axis=0), two.max(axis=0))
-    return float(np.linalg.norm(np.maximum(low - high, 0.0)))
-
-
-def _see_start(watch: _Sightings, meshes: Mapping[str, Mesh], poses: Poses) -> None:
-    """All pairs in shape A, save those whose boxes are farther apart than the least so far."""
-    groups = {name: _Group([name], meshes, poses) for name in meshes}
-    points = {name: _placed(meshes[name], poses[name]) for name in meshes}
-    names = list(meshes)
-    for i, one in enumerate(names):
-        for two in names[:i]:
-            if _boxes_apart(points[one], points[two]) <= watch.least:
-                watch.see(groups[one], groups[two], "shape A", True)
-    watch.poses = 1
+def _see_start(watch: _Sightings, poses: Poses) -> None:
+    """All pairs in shape A."""
+    placed = _Placed(watch.bodies, poses)
+    for name, pose in poses.items():
+        watch.bodies[name].put(pose)
+    apart = placed.apart(placed)
+    apart[np.triu_indices(len(apart))] = np.inf  # each pair once
+    watch.see(placed, placed, apart, "shape A", True)
 
 
 def sample_path(
@@ -282,9 +283,9 @@ def sample_path(
     def poses_at(angles: F64) -> Poses:
         return linkage.poses(dict(zip(hinges, angles.tolist(), strict=True)))
 
-    watch = _Sightings()
+    watch = _Sightings({name: _FclBody(mesh) for name, mesh in meshes.items()})
     progress.update(0.0, "looking at shape A")
-    _see_start(watch, meshes, poses_at(frames[0]))
+    _see_start(watch, poses_at(frames[0]))
     overlap = _overlap(meshes, poses_at(frames[0])) + _overlap(meshes, poses_at(frames[-1]))
     total = len(frames) - 1
     for number in range(1, total + 1):
@@ -296,7 +297,7 @@ def sample_path(
         turn = float((after - before)[turning[0]])
         move = f"move {number} of {total} ({hinge})"
         progress.update((number - 1) / total, f"looking at {move}")
-        _see_move(watch, linkage, meshes, poses_at(before), hinge, turn, move, step_deg, gap_step)
+        _see_move(watch, linkage, poses_at(before), hinge, turn, move, step_deg, gap_step)
     progress.update(1.0, f"{watch.poses} poses, smallest gap {watch.least:.3f} mm")
     return SampledPath(
         step_deg=step_deg,
@@ -312,7 +313,6 @@ def sample_path(
 def _see_move(
     watch: _Sightings,
     linkage: _Linkage,
-    meshes: Mapping[str, Mesh],
     poses: Poses,
     hinge: str,
     turn: float,
@@ -322,8 +322,9 @@ def _see_move(
 ) -> None:
     """All poses of one move, up to its first collision."""
     carried = linkage.carried(hinge)
-    moving = _Group([name for name in linkage.names if name in carried], meshes, poses)
-    resting = _Group([name for name in linkage.names if name not in carried], meshes, poses)
+    resting = _Placed(watch.bodies, {n: poses[n] for n in linkage.names if n not in carried})
+    for name, pose in resting.poses.items():
+        watch.bodies[name].put(pose)
     parent = poses[linkage.ends[hinge][0]]
     point = parent[:3, :3] @ linkage.point[hinge] + parent[:3, 3]
     direction = parent[:3, :3] @ np.array(linkage.direction[hinge], dtype=float)
@@ -331,7 +332,11 @@ def _see_move(
     every = max(1, math.floor(gap_step / (abs(turn) / count) + 1e-9))
     for k in range(count + 1):
         angle = turn * k / count
-        moving.turn(_turn(point, direction, angle))
+        turned = _turn(point, direction, angle)
+        moving = _Placed(
+            watch.bodies, {n: turned @ poses[n] for n in linkage.names if n in carried}
+        )
         where = f"{move}, {abs(angle):g}°"
-        if not watch.see(moving, resting, where, k % every == 0 or k == count):
+        measure = k % every == 0 or k == count
+        if not watch.see(moving, resting, moving.apart(resting), where, measure):
             return

@@ -61,7 +61,7 @@ class KernelCompiler:
     Examples
     --------
     >>> compiler = KernelCompiler()
-    >>> compiler.start()  # goes on beside what follows
+    >>> begun = compiler.start()  # goes on beside what follows
     >>> compiler.close()
     """
 
