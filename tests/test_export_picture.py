@@ -70,7 +70,6 @@ def test_light_found_once_a_pixel_is_that_of_its_samples(monkeypatch, samples):
     monkeypatch.setattr("fabfold.export.render._whole_pixels", whole_pixels)
     once = render(meshes, colours, view=view).astype(int)
     model = _inked(once)
-    assert (wholes[0] & ~model).sum() == 0
     assert 0.6 < wholes[0].sum() / model.sum() < 1.0, "all but outlines and creases"
     none = lambda triangle, *_: np.zeros([side // samples for side in triangle.shape], bool)  # noqa: E731
     monkeypatch.setattr("fabfold.export.render._whole_pixels", none)

@@ -96,6 +96,8 @@ def light_at(
 class ShadowFloor:
     """The floor under a model, which shows nothing but the model's shadow.
 
+    Its shadows are soft, so the light is found for every second pixel along both sides.
+
     Parameters
     ----------
     vertices : (v, 3) float64 array
@@ -108,7 +110,8 @@ class ShadowFloor:
     Attributes
     ----------
     points : (n, 3) float32 array
-        Points of the floor where the light is wanted: one for each pixel that looks at it.
+        Points of the floor where the light is wanted: one for each square of two by two pixels
+        that look at it.
     normals : (n, 3) float32 array
         Unit normals there: upwards.
     """
@@ -116,7 +119,8 @@ class ShadowFloor:
     def __init__(self, vertices: NDArray[np.float64], camera: PinholeCamera, view: View) -> None:
         width, height = view.size
         right, up, away = camera.frame
-        across, down = np.arange(width) + 0.5, np.arange(height) + 0.5
+        self._size = (height, width)
+        across, down = (np.arange((side + 1) // 2) * 2.0 + 1.0 for side in (width, height))
         x = (across * view.samples - camera.centre[0]) / camera.focal
         y = (camera.centre[1] - down * view.samples) / camera.focal
         rays = x[None, :, None] * right + y[:, None, None] * up - away
@@ -157,4 +161,14 @@ class ShadowFloor:
         shade = np.clip(light / self._open, 0.0, 1.0)
         left = np.ones(self._seen.shape, dtype=np.float32)
         left[self._seen] = 1.0 - 0.75 * self._fade * (1.0 - shade)
-        return left
+        return _twice_as_fine(left)[: self._size[0], : self._size[1]]
+
+
+def _twice_as_fine(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Values at twice as many places along both axes, linear in between."""
+    for axis in (0, 1):
+        each = np.repeat(values, 2, axis=axis)
+        around = np.pad(each, [(1, 1) if a == axis else (0, 0) for a in (0, 1)], mode="edge")
+        before, after = np.split(around, [2], axis=axis)[1], np.split(around, [-2], axis=axis)[0]
+        values = (before + 2.0 * each + after) / np.float32(4.0)
+    return values

@@ -112,46 +112,41 @@ def render(
     camera = camera_for(held, view, pixels, distance)
     screen = project(vertices, camera)
     near, triangle = fill_triangles(screen, corners, *pixels)
-    points, facing = surface_points(triangle, screen, corners, vertices, normals)
-    # Without a ground there is nothing to draw beside the model.
-    window = np.s_[:, :] if view.ground else _window(triangle, samples)
-    near, triangle, points, facing = near[window], triangle[window], points[window], facing[window]
-    covered = triangle >= 0
+    # What is drawn sample by sample is the model; around it there is a page, or a floor.
+    window, framed = _window(triangle, samples)
+    first = np.array([[window[1].start, window[0].start, 0.0]])
+    near, triangle = near[window], triangle[window]
+    points, facing = surface_points(triangle, screen - first, corners, vertices, normals)
     whole = _whole_pixels(triangle, near, facing, owner, samples)
-    parts = covered & ~np.repeat(np.repeat(whole, samples, axis=0), samples, axis=1)
-    places = np.concatenate([_mean(points, whole, samples), points[parts]])
+    parts = (triangle >= 0) & ~np.repeat(np.repeat(whole, samples, axis=0), samples, axis=1)
     mean = _mean(facing, whole, samples)
     mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+    places = np.concatenate([_mean(points, whole, samples), points[parts]])
     directions = np.concatenate([mean, facing[parts]])
-    floor = ShadowFloor(vertices, camera, view) if view.ground else None
-    image = np.empty((*triangle.shape, 3), dtype=np.float32)
-    image[:] = linear_light(view.background)
-    on_model = len(places)
-    lit_places, lit_directions = places, directions
-    if floor is not None:
-        lit_places = np.concatenate([places, floor.points])
-        lit_directions = np.concatenate([directions, floor.normals])
-    light = light_at(lit_places, lit_directions, vertices, corners, view)
-    if floor is not None:
-        shadow = floor.darkened(light[on_model:])
-        image *= np.repeat(np.repeat(shadow, samples, axis=0), samples, axis=1)[..., None]
-    paint = linear_light(colours)[owner]
-    seen_of = np.concatenate([triangle[::samples, ::samples][whole], triangle[parts]])
-    painted = _painted(paint[seen_of], light[:on_model], places, directions, camera, view)
-    count = int(whole.sum())
-    for part in _places(image, samples):
-        part[whole] = painted[:count]
-    image[parts] = painted[count:]
-    lines = _lines(triangle, near, facing * covered[..., None], owner)
-    image *= (1.0 - view.edges * lines)[..., None]
-    parts_of_pixel = _places(image, samples)
-    seen = sum(parts_of_pixel[1:], parts_of_pixel[0]) / np.float32(samples**2)
-    rows, columns = whole.shape
     width, height = view.size
     sheet = np.empty((height, width, 3), dtype=np.float32)
     sheet[:] = linear_light(view.background)
-    top, left = ((part.start or 0) // samples for part in window)
-    sheet[top : top + rows, left : left + columns] = seen
+    if view.ground:
+        floor = ShadowFloor(vertices, camera, view)
+        light = light_at(
+            np.concatenate([places, floor.points]),
+            np.concatenate([directions, floor.normals]),
+            vertices, corners, view,
+        )  # fmt: skip
+        sheet *= floor.darkened(light[len(places) :])[..., None]
+    else:
+        light = light_at(places, directions, vertices, corners, view)
+    seen_of = np.concatenate([triangle[::samples, ::samples][whole], triangle[parts]])
+    paint = linear_light(colours)[owner[seen_of]]
+    painted = _painted(paint, light[: len(places)], places, directions, camera, view)
+    count = int(whole.sum())
+    image = np.repeat(np.repeat(sheet[framed], samples, axis=0), samples, axis=1)
+    for part in _places(image, samples):
+        part[whole] = painted[:count]
+    image[parts] = painted[count:]
+    image *= (1.0 - view.edges * _lines(triangle, near, facing, owner))[..., None]
+    of_pixel = _places(image, samples)
+    sheet[framed] = sum(of_pixel[1:], of_pixel[0]) / np.float32(samples**2)
     return bytes_of_light(sheet)
 
 
@@ -189,18 +184,21 @@ def _whole_pixels(
     return found
 
 
-def _window(triangle: NDArray[np.int32], samples: int) -> tuple[slice, slice]:
-    """Rows and columns of whole pixels that hold every sample of the model and its outline."""
+def _window(
+    triangle: NDArray[np.int32], samples: int
+) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """The samples, and the pixels, that hold all of the model and its outline."""
     covered = triangle >= 0
-    parts = []
+    pixels = []
     for axis in (1, 0):
         found = np.flatnonzero(covered.any(axis=axis))
-        size = covered.shape[1 - axis]
+        size = covered.shape[1 - axis] // samples
         first, last = (int(found[0]), int(found[-1])) if len(found) else (0, 0)
-        low = max(0, first - 1) // samples * samples
-        high = min(size, -(-(last + 2) // samples) * samples)
-        parts.append(slice(low, high))
-    return parts[0], parts[1]
+        low = max(0, first - 1) // samples
+        high = min(size, -(-(last + 2) // samples))
+        pixels.append(slice(low, high))
+    rows, columns = (slice(part.start * samples, part.stop * samples) for part in pixels)
+    return (rows, columns), (pixels[0], pixels[1])
 
 
 def _gathered(

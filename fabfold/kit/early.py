@@ -133,7 +133,7 @@ def write_early(work: bytes, before_writing: Callable[[], object] = lambda: None
     from fabfold.progress import SilentProgress
 
     planned, mode, recipe, folder = pickle.loads(work)
-    built = build(planned, mode, recipe.voxel_mm, (), SilentProgress())
+    built = build(planned, mode, recipe.voxel_mm, (), SilentProgress(), orders=False)
     before_writing()
     write_printable(folder, recipe, mode, built)
 

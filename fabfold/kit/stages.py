@@ -63,6 +63,8 @@ def build(
     voxel_mm: float,
     refused: tuple[str, ...],
     progress: Progress,
+    *,
+    orders: bool = True,
 ) -> BuiltTree:
     """Make the bodies of a tree, and certify its path on them.
 
@@ -78,6 +80,8 @@ def build(
         Why each better-ranked tree was passed over.
     progress : Progress
         Hears which body is cut and which move is proven.
+    orders : bool
+        Whether it is also proven which moves may come in any order, for the manual.
 
     Raises
     ------
@@ -123,16 +127,17 @@ def build(
         min_gap_mm=profile.min_gap_mm,
         progress=progress,
     )
-    certificate["any_order"] = certify_orders(
-        tree,
-        motion,
-        meshes,
-        voxel_mm=joinery.voxel_mm,
-        origin_mm=joinery.origin_mm,
-        min_gap_mm=profile.min_gap_mm,
-        progress=progress,
-        volume=np.array([body.volume for body in joinery.bodies]),
-    )
+    if orders:
+        certificate["any_order"] = certify_orders(
+            tree,
+            motion,
+            meshes,
+            voxel_mm=joinery.voxel_mm,
+            origin_mm=joinery.origin_mm,
+            min_gap_mm=profile.min_gap_mm,
+            progress=progress,
+            volume=np.array([body.volume for body in joinery.bodies]),
+        )
     tight = [tree.hinges[pin.hinge].name for pin in joinery.pins if pin.tight]
     if tight:
         certificate["geometry"] += (
