@@ -24,9 +24,6 @@ __all__ = ["InProcessExecutor", "ProcessExecutor"]
 PATIENCE = 5.0
 #: Seconds that a worker on standby waits for its first seed before it ends.
 STANDBY = 60.0
-#: How much other processes go before workers, as of nice(1): a first kit is built beside them, and
-#: people use the machine.
-_NICE = 5
 
 
 class InProcessExecutor:
@@ -231,8 +228,6 @@ def _serve(connection: Connection, standby: tuple[JointSet, float] | None) -> No
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     caller = multiprocessing.parent_process()
     end_with_parent(None if caller is None else caller.pid)
-    if hasattr(os, "nice"):
-        os.nice(_NICE)
     if standby is not None:
         joints, seconds = standby
         run_seed(warm_up_job(joints), 1, lambda _: None, lambda: False)
