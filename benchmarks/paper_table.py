@@ -60,6 +60,7 @@ def run_one(source: str, template: str, kit_folder: Path) -> dict[str, Any]:
     first = FirstKit()
     row: dict[str, Any] = {"template": template}
     start = time.perf_counter()
+    kit = None
     try:
         kit = Kit.from_model(source, template=template, folder=kit_folder)
         kit.listener = first
@@ -72,7 +73,7 @@ def run_one(source: str, template: str, kit_folder: Path) -> dict[str, Any]:
     except FabfoldError as error:
         row["exit"], row["error"] = error.exit_code, str(error)
     row["total"] = time.perf_counter() - start
-    row["seconds"], row["first"] = kit.processor_seconds, first.seconds
+    row["seconds"], row["first"] = {} if kit is None else kit.processor_seconds, first.seconds
     usage = [
         resource.getrusage(who).ru_maxrss
         for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
