@@ -7,6 +7,7 @@ import pytest
 import trimesh
 from stage_listener import StageListener
 
+from fabfold.errors import NoFoldError
 from fabfold.kit.early import EarlyKit
 from fabfold.progress import SilentListener
 
@@ -61,6 +62,16 @@ def test_a_tree_whose_bodies_do_not_come_out_says_why_and_leaves_nothing(bar_kit
         early.start(found)
         early.wait()
     assert "Error" in listener.told["early"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_its_process_waits_for_a_tree_and_ends_where_none_comes(bar_kit, tmp_path):
+    with pytest.raises(NoFoldError):
+        with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), SilentListener()) as early:
+            process = early._process
+            assert process.poll() is None
+            raise NoFoldError("nothing folds")
+    assert process.poll() is not None
     assert list(tmp_path.iterdir()) == []
 
 

@@ -67,7 +67,8 @@ class EarlyKit:
 
     def __enter__(self) -> EarlyKit:
         """Start the process, which loads what it needs before there is a tree."""
-        if not (self._folder / "tree.json").is_file():
+        there = (self._folder / name for name in ("tree.json", "report.json"))
+        if not any(path.is_file() for path in there):
             self._process = self._open()
         return self
 
