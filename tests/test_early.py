@@ -66,11 +66,11 @@ def test_a_tree_whose_bodies_do_not_come_out_says_why_and_leaves_nothing(bar_kit
 
 
 def test_its_process_waits_for_a_tree_and_ends_where_none_comes(bar_kit, tmp_path):
-    with pytest.raises(NoFoldError):
-        with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), SilentListener()) as early:
-            process = early._process
-            assert process.poll() is None
-            raise NoFoldError("nothing folds")
+    early = EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), SilentListener())
+    with pytest.raises(NoFoldError), early:
+        process = early._process
+        assert process.poll() is None
+        raise NoFoldError("nothing folds")
     assert process.poll() is not None
     assert list(tmp_path.iterdir()) == []
 
