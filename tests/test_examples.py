@@ -20,8 +20,8 @@ EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
 
 
 #: What takes long in an example, and what stands in for it here: smaller boxes, plain blocks, no
-#: processes for searches that are over before those have started, and in two of them the printed
-#: bodies in place of all files.
+#: processes for searches that are over before those have started, and in two of them bodies and
+#: checks in place of all files.
 STAND_INS = {
     "01_fold_a_sample": {
         '"sample:car", effort="quick"': (
@@ -32,11 +32,11 @@ STAND_INS = {
     "02_own_model": {'effort="quick"': 'effort="quick", workers=1'},
     "03_own_template": {
         'effort="quick"': 'effort="quick", workers=1',
-        "kit.export()": 'kit.run("join")',
+        "kit.export()": 'kit.run("check")',
     },
     "04_own_printer": {
         'effort="quick"': 'effort="quick", workers=1',
-        "kit.export()": 'kit.run("join")',
+        "kit.export()": 'kit.run("check")',
     },
     "06_seeds_on_a_cluster": {
         "(90.0, 20.0, 20.0)": "(40.0, 20.0, 10.0)",
@@ -85,21 +85,16 @@ def read(path):
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def check_bodies(folder):
-    """What holds of every kit that was built: it fits its template, and its path is certified."""
+def check_kit(folder):
+    """What holds of every kit: it fits its template, and all its checks pass."""
     tree, motion = read(folder / "tree.json"), read(folder / "motion.json")
     assert len(list((folder / "bodies").glob("*.stl"))) == len(tree["bodies"])
     assert len(tree["bodies"]) == len(tree["hinges"]) + 1
     cells = {tuple(cell) for cell in tree["template"]["cells"]}
     assert {tuple(cell) for cell in tree["target"]} <= cells
+    assert read(folder / "report.json")["verdict"] == "ok"
     assert motion["certificate"]["min_gap_mm"] > 0.0
     return tree, motion
-
-
-def check_kit(folder):
-    """The same, and all checks of the kit pass."""
-    assert read(folder / "report.json")["verdict"] == "ok"
-    return check_bodies(folder)
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +164,7 @@ def test_02_cuts_a_model_by_hand(tmp_path):
 @pytest.mark.slow
 def test_03_folds_into_a_template_from_a_file(tmp_path):
     run_here("03_own_template", cwd=tmp_path)
-    tree, _ = check_bodies(tmp_path / "stairs-kit")
+    tree, _ = check_kit(tmp_path / "stairs-kit")
     stairs = load_template(str(tmp_path / "stairs.toml"))
     heights = np.zeros(stairs.shape[:2], int)
     for i, j, _ in stairs.cells:
@@ -186,7 +181,7 @@ def test_04_calibrates_a_printer(tmp_path):
     profile = load_profile(str(home / "my-printer.toml"))
     assert (profile.clearance_mm, profile.min_gap_mm) == (0.4, 0.35)
     assert "clearance_mm = 0.4" in said
-    check_bodies(home / "bar-kit")
+    check_kit(home / "bar-kit")
     motion = Motion.from_json(read(home / "bar-kit" / "motion.json"))
     assert motion.certificate["min_gap_mm"] >= 0.35
     assert (home / "coupon.3mf").is_file()

@@ -20,10 +20,6 @@ from fabfold.kit.kit import Kit, open_kit
 
 pytestmark = pytest.mark.slow
 
-needs_root = pytest.mark.skipif(
-    sys.platform != "linux" or os.getuid() != 0, reason="needs root on Linux"
-)
-
 
 def cut_off(path: Path) -> None:
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
@@ -35,32 +31,20 @@ def flipped(path: Path) -> None:
     path.write_bytes(data)
 
 
-FAULTS = [cut_off, flipped, Path.unlink]
-
-
 def assert_same(folder: Path, wanted: Path) -> None:
     found, want = contents(folder), contents(wanted)
     assert sorted(found) == sorted(want)
     assert [name for name in want if found[name] != want[name]] == []
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
+@pytest.mark.parametrize("fault", [cut_off, flipped, Path.unlink], ids=lambda fault: fault.__name__)
 def test_stage_files_that_are_damaged_are_made_again(
     fault: Any, bar_kit: Kit, tmp_path: Path
 ) -> None:
-    """One file of the search and one of the bodies, each in the same way."""
+    """One file of the search, one of the bodies and one that is delivered, each in the same way."""
     folder = tmp_path / "kit"
     shutil.copytree(bar_kit.folder, folder)
-    for name in ("stages/fold.json", "stages/made-bodies.npz"):
-        fault(folder / name)
-    open_kit(str(folder), workers=1).join()
-    assert_same(folder, bar_kit.folder)
-
-
-def test_delivered_files_that_are_damaged_are_made_again(bar_kit: Kit, tmp_path: Path) -> None:
-    folder = tmp_path / "kit"
-    shutil.copytree(bar_kit.folder, folder)
-    for fault, name in zip(FAULTS, ("bar.3mf", "bodies/body-01.stl", "bar.step"), strict=True):
+    for name in ("stages/fold.json", "stages/made-bodies.npz", "bar.3mf"):
         fault(folder / name)
     open_kit(str(folder), workers=1).export()
     assert_same(folder, bar_kit.folder)
@@ -134,50 +118,35 @@ def small_disk(folder: Path, size: str) -> Iterator[None]:
         subprocess.run(["umount", str(folder)], check=True)
 
 
-def told_and_made_good(disk: Path, *call: str) -> None:
-    """A command on a full disk says so in one line; with room on it the same goes on."""
-    done = fabfold(*call, cwd=disk.parent)
-    assert done.returncode == 2, done.stderr
-    assert "the disk is full" in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
-    assert not list(disk.rglob(".part-*"))
-    subprocess.run(["mount", "-o", "remount,size=100m", str(disk)], check=True)
-    again = command(*call)
-    assert again.exit_code == 0, again.stderr
-
-
-@needs_root
-def test_a_disk_that_is_full_while_the_search_writes_is_told_and_made_good(
-    bar: Path, bar_options: dict[str, Any], bar_kit: Kit, tmp_path: Path
-) -> None:
-    disk = tmp_path / "disk"
-    with small_disk(disk, "100k"):
-        more = ["-o", str(disk / "kit"), "-q", "-j", "1", *arguments_of(bar_options)]
-        told_and_made_good(disk, "fold", str(bar), *more)
-        found, want = contents(disk / "kit" / "stages"), contents(bar_kit.folder / "stages")
-        assert "fold.json" in found
-        del found["journal.json"]  # it tells of fewer stages
-        assert [name for name in found if found[name] != want[name]] == []
-
-
-@needs_root
-def test_a_disk_that_is_full_while_files_are_delivered_is_told_and_made_good(
+@pytest.mark.skipif(sys.platform != "linux" or os.getuid() != 0, reason="needs root on Linux")
+@pytest.mark.parametrize("share", [0.1, 0.9])
+def test_a_full_disk_is_told_and_made_good(
+    share: float,
     bar: Path,
     bar_options: dict[str, Any],
     bar_kit: Kit,
     searched: Callable[[Path], Path],
     tmp_path: Path,
 ) -> None:
+    """It is full while the search writes its first files, or while the last ones are delivered."""
     disk = tmp_path / "disk"
+    call = ["export", str(bar), "-o", str(disk / "kit"), "-q", "-j", "1"]
     whole = sum(len(data) for data in contents(bar_kit.folder).values())
-    with small_disk(disk, f"{int(0.9 * whole / 1024)}k"):
-        searched(disk / "kit")
-        more = ["-o", str(disk / "kit"), "-q", "-j", "1", *arguments_of(bar_options)]
-        told_and_made_good(disk, "export", str(bar), *more)
+    with small_disk(disk, f"{int(share * whole / 1024)}k"):
+        if share > 0.5:
+            searched(disk / "kit")
+        done = fabfold(*call, *arguments_of(bar_options), cwd=tmp_path)
+        assert done.returncode == 2, done.stderr
+        assert "the disk is full" in done.stderr
+        assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+        assert not list(disk.rglob(".part-*"))
+        subprocess.run(["mount", "-o", "remount,size=100m", str(disk)], check=True)
+        done = command(*call, *arguments_of(bar_options))
+        assert done.exit_code == 0, done.stderr
         assert_same(disk / "kit", bar_kit.folder)
 
 
-@needs_root
+@pytest.mark.skipif(sys.platform != "linux" or os.getuid() != 0, reason="needs root on Linux")
 def test_a_place_that_can_only_be_read_is_told(bar: Path, bar_kit: Kit, tmp_path: Path) -> None:
     disk = tmp_path / "disk"
     with small_disk(disk, "100m"):

@@ -164,7 +164,7 @@ def test_protected_voxels_are_one_body():
     voxels = cut(solid, "box-4x4x2")
     region = sample_region(solid, parse_region("sphere(4,1,1,1.05)", "--protect"))
     wishes = Wishes(regions=(region,))
-    plain = [search(voxels, "box-4x4x2", Wishes(), seed)[0] for seed in range(2)]
+    plain = [search(voxels, "box-4x4x2", Wishes(), seed)[0] for seed in range(4)]
     before = [wishes.report(voxels, tree)[0]["share"] for tree in plain]
     tree, protected = search(voxels, "box-4x4x2", wishes)
     (group,) = protected[0].groups
