@@ -109,6 +109,10 @@ def test_a_centre_of_mass_is_over_the_outline_of_what_touches_or_beside_it():
     assert stands_over(centre(0.0), ring)
     assert stands_over(centre(9.9999), ring)
     assert not stands_over(centre(10.0001), ring)
+    square = np.array([[x, y] for x in (-0.3, 0.1) for y in (-0.7, 0.7)]) @ np.array(
+        [[0.8, 0.6], [-0.6, 0.8]]
+    )
+    assert stands_over(np.append(square[2:].mean(axis=0), 5.0), square), "over a side"
     assert not stands_over(centre(0.0), ring[:2])
     line = np.stack([np.arange(-3.0, 4.0), np.zeros(7)], axis=1)
     assert not stands_over(centre(0.0), line), "what touches in a line spans no area"

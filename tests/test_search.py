@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -68,9 +69,8 @@ def test_workers_that_stood_by_take_the_seeds_or_new_ones_do(problem, alone, sec
         heard.on_event(event)
 
     job = Job(problem, LatticeFoldability(), EFFORT)
-    with executor(1, None, 4, lambda: False, pool) as ready:
-        assert ready is pool
-        run_seeds(ready, ((seed, job) for seed in range(4)), on_event, lambda: False)
+    with closing(pool):
+        run_seeds(pool, ((seed, job) for seed in range(4)), on_event, lambda: False)
     assert (ran == {first}) == (seconds > 0.0)
     found = [c for seed in range(4) for c in heard.done[seed].candidates]
     assert key(sorted(found, key=lambda c: c.energy["total"])) == key(alone)

@@ -418,7 +418,7 @@ class Kit(StageRunner):
         """
         from fabfold.search.pareto import solutions
 
-        search = (self._rounds_of, self._open_progress, self.workers, self.scheduler)
+        search = (self._rounds_of, self._open_progress)
         return self._once("pareto", lambda: solutions(self.recipe, *search))
 
     def _found(self) -> Iterator[list[Found]]:

@@ -9,6 +9,9 @@ __all__ = ["stands_over"]
 
 Floats = NDArray[np.float64]
 
+#: Share of the outline's size by which rounding moves a point.
+_ROUNDING = 1e-12
+
 
 def stands_over(centre: Floats, under: Floats) -> bool:
     """Whether a centre of mass is over the convex hull of what touches the plate.
@@ -32,4 +35,6 @@ def stands_over(centre: Floats, under: Floats) -> bool:
         sides = ConvexHull(under).equations
     except (QhullError, ValueError):
         return False
-    return bool((sides[:, :2] @ centre[:2] + sides[:, 2]).max() <= 0.0)
+    # Over a side is over it, whatever the last digits say.
+    slack = _ROUNDING * float(np.ptp(under, axis=0).max())
+    return bool((sides[:, :2] @ centre[:2] + sides[:, 2]).max() <= slack)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from fabfold.errors import NoFoldError, NoTreeError, RecipeError
 from fabfold.progress import Progress
-from fabfold.search.run import Budget, Tally, executor, run_seeds
+from fabfold.search.run import Budget, Tally, run_seeds
 from fabfold.search.seeds import Event, Job, SeedResult
 from fabfold.tree.candidate import Candidate
 from fabfold.voxels.voxel_model import Voxels
@@ -102,8 +102,6 @@ def solutions(
     recipe: Recipe,
     rounds_of: Callable[[Recipe, int], Rounds],
     open_progress: Callable[[str], AbstractContextManager[Progress]],
-    workers: int | None,
-    scheduler: str | None,
 ) -> list[Solution]:
     """Search the ladder, a round at a time, until a round finds trees that fold.
 
@@ -115,8 +113,6 @@ def solutions(
         Makes the search of a recipe whose seeds are shifted by a number.
     open_progress : callable
         Opens the progress of a stage by its name.
-    workers, scheduler
-        See :func:`fabfold.search.run.executor`.
 
     Raises
     ------
@@ -135,7 +131,7 @@ def solutions(
 
     most = min(recipe.rounds, _STEP // SEEDS_PER_ROUND)
     for number in range(most):
-        found, fitted, reason = _round(ladder, number, open_progress, workers, scheduler)
+        found, fitted, reason = _round(ladder, number, open_progress)
         fits, why = fits or fitted, why or reason
         if found:
             return undominated(found)
@@ -167,8 +163,6 @@ def _round(
     ladder: Sequence[Rounds],
     number: int,
     open_progress: Callable[[str], AbstractContextManager[Progress]],
-    workers: int | None,
-    scheduler: str | None,
 ) -> tuple[list[Solution], bool, str]:
     """One round of every step: solutions, whether any tree fitted, and why not."""
     batches = [rounds.batch(number) for rounds in ladder]
@@ -191,7 +185,7 @@ def _round(
                 tally.on_event(event)
 
             forever = Budget()
-            with executor(workers, scheduler, len(owner), forever.over) as pool:
+            with ladder[0].executor(len(owner), forever.over) as pool:
                 run_seeds(pool, tasks(), on_event, forever.over)
             tally.check_failures()
             results = tally.results

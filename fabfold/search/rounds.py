@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, closing
 from dataclasses import replace
 from typing import Any
 
@@ -240,14 +240,14 @@ class Rounds:
             self.wait_for_kernels(progress)
             budget = Budget(seconds)
             tally = Tally(progress, {}, lambda _done: budget.share, describe=self.describe)
-            with self._executor(rounds, budget.over) as pool:
+            with self.executor(rounds, budget.over) as pool:
                 progress.update(None, "getting ready")
                 warm_up(pool, self.recipe.joints)
                 budget.restart()
                 for number in range(rounds):
                     results |= self._search_round(number, pool, tally, budget)
                     tally.check_failures()
-                    if budget.over() or not self._searchable(results):
+                    if budget.over() or not any(result.fits for result in results.values()):
                         break
         tally.check_failures()
         return results
@@ -257,13 +257,12 @@ class Rounds:
         if self._standby is not None:
             self._standby.wait(progress)
 
-    def _executor(self, seeds: int, over: Callable[[], bool]) -> AbstractContextManager[Executor]:
+    def executor(self, seeds: int, over: Callable[[], bool]) -> AbstractContextManager[Executor]:
+        """What runs the seeds: workers that stood by, or :func:`fabfold.search.run.executor`."""
         ready = None if self._standby is None else self._standby.take()
-        return executor(self.workers, self.scheduler, seeds, over, ready)
-
-    def _searchable(self, results: Mapping[int, SeedResult]) -> bool:
-        """Whether any voxelization that was looked at can be searched at all."""
-        return any(result.fits for result in results.values())
+        if ready is not None:
+            return closing(ready)
+        return executor(self.workers, self.scheduler, seeds, over)
 
     def _round(self, number: int) -> list[Found]:
         """Trees that a round finds, each seed run to its end."""
@@ -277,7 +276,7 @@ class Rounds:
                 total = sum(rung.seeds for rung in self._rungs(number))
                 tally = Tally(progress, {}, lambda done: done / total, total, self.describe)
                 forever = Budget()
-                with self._executor(total, forever.over) as pool:
+                with self.executor(total, forever.over) as pool:
                     results = self._search_round(number, pool, tally, forever)
                 tally.check_failures()
         require_fit([results[seed] for seed in sorted(results)])

@@ -76,11 +76,7 @@ class Budget:
 
 @contextmanager
 def executor(
-    workers: int | None,
-    scheduler: str | None,
-    seeds: int,
-    over: Callable[[], bool],
-    ready: Executor | None = None,
+    workers: int | None, scheduler: str | None, seeds: int, over: Callable[[], bool]
 ) -> Iterator[Executor]:
     """Open what runs the seeds; nothing runs any more when the context closes.
 
@@ -95,8 +91,6 @@ def executor(
         Seeds that there may be to run.
     over : callable
         Whether the seeds that run shall end.
-    ready : Executor, optional
-        Taken where it is given: processes that were started beside what came before.
 
     Raises
     ------
@@ -106,9 +100,7 @@ def executor(
     opened: Executor
     if workers is not None and workers < 1:
         raise RecipeError(f"--workers {workers}: there must be at least one")
-    if ready is not None:
-        opened = ready
-    elif scheduler is not None:
+    if scheduler is not None:
         from fabfold.search.dask import DaskExecutor
 
         opened = DaskExecutor(scheduler)

@@ -28,7 +28,7 @@ class SearchStandby:
     """
 
     def __init__(self, workers: int | None, joints: JointSet) -> None:
-        self._count = workers or os.cpu_count() or 1
+        self._count = (os.cpu_count() or 1) if workers is None else workers
         self._joints: JointSet = joints
         self._compiler = KernelCompiler()
         self._pool: ProcessExecutor | None = None
