@@ -11,12 +11,14 @@ from fabfold.fold.lattice_foldability import LatticeFoldability
 from fabfold.lattice.rotations import ROTATIONS, parity
 from fabfold.lattice.shipped import load_template
 from fabfold.tree.bound import (
+    ClosingBound,
     closed_at_most,
     closed_share,
     least_surface,
     phase_bounds,
     visible_faces,
 )
+from fabfold.tree.catalogue import JOINT_SETS
 from fabfold.tree.effort import Effort
 from fabfold.tree.leaf_assignment import assign, reassign_leaves
 from fabfold.tree.pose_energy import count_defects, energy_of
@@ -81,6 +83,22 @@ def test_no_tree_closes_the_box_further_than_the_bound(bar, folded):
         assert closed <= closed_at_most(bar) + 1e-9
         shown = candidate.energy["surface"] / visible_faces(bar.template)
         assert closed == pytest.approx(1 - shown)
+
+
+@pytest.mark.parametrize("joints", JOINT_SETS)
+@pytest.mark.parametrize("name", ["box-2x2x2", "box-3x2x2", "box-4x2x1", "l-64"])
+def test_the_bound_of_cells_and_depths_is_that_of_the_problem(name, joints):
+    template = load_template(name)
+    rng = np.random.default_rng(len(template))
+    for count in (len(template), len(template) - 1):
+        depth = rng.random((count, 6))
+        problem = solid_problem(strip(count), name, depth=depth, joints=joints)
+        least = least_surface(problem) / problem.weights.surface
+        bound = ClosingBound(template, joints)
+        if np.isinf(least):
+            assert np.isinf(bound.open_faces(problem.source, depth))
+        else:
+            assert bound.open_faces(problem.source, depth) == pytest.approx(least, rel=1e-5)
 
 
 def test_an_empty_cell_counts_its_visible_faces():

@@ -9,8 +9,10 @@ from fabfold.lattice.rotations import parity
 from fabfold.lattice.shipped import load_template
 from fabfold.lattice.template import Template
 from fabfold.meshes import mesh_volume
+from fabfold.progress import SilentProgress
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.scan import summed_volume
+from fabfold.tree.bound import ClosingBound
 from fabfold.voxels.features import features
 from fabfold.voxels.grid_placement import (
     Capacity,
@@ -20,6 +22,8 @@ from fabfold.voxels.grid_placement import (
     rank_translations,
 )
 from fabfold.voxels.offsets import CellEnergy
+from fabfold.voxels.outlook import Outlook, grids_of_better_outlook
+from fabfold.voxels.refinement import Refinement
 from fabfold.voxels.voxel_files import save_voxels
 from fabfold.voxels.voxel_model import Voxels
 from fabfold.voxels.voxelize import fill_shares, voxelize
@@ -327,18 +331,81 @@ def test_ranked_translations_agree_with_judge():
         assert rows[row, 3] == pytest.approx(fit.lost / (fit.lost + fit.fill))
 
 
-def test_of_a_size_one_half_is_rated_best_and_the_other_is_the_fullest():
-    seen = []
+@pytest.fixture(scope="module")
+def judged():
+    """A torus cut by its outlook, and every grid that was judged, with its outlook."""
+    template = load_template("box-3x3x2")
+    seen = {}
 
-    def rate(voxels):
-        seen.append(voxels)
-        return float(len(voxels)) - voxels.energy["fill"]  # the emptier the better
+    def open_faces(cells, depth):
+        least = ClosingBound(template, "S").open_faces(cells, depth)
+        seen[cells.tobytes(), depth.tobytes()] = least
+        return least
 
-    template = load_template("box-2x2x2")
-    found = voxelize(torus(), template, placements=30, shortlist=12, results=2, rate=rate)
-    ratings = [round(rate(voxels), 4) for voxels in found]
-    seen = seen[:-2]
+    found = voxelize(torus(), template, placements=6, shortlist=3, results=2, open_faces=open_faces)
+    return template, found, seen
+
+
+def test_voxels_of_the_best_outlook_are_taken(judged):
+    template, found, seen = judged
     assert len(found) == 2 < len(seen)
-    assert ratings[0] == max(round(rate(voxels), 4) for voxels in list(seen))
-    scores = [voxels.energy["score"] for voxels in seen if voxels is not found[0]]
-    assert found[1].energy["score"] == max(scores)
+    bound = ClosingBound(template, "S")
+    outlook = []
+    for voxels in found:
+        least = bound.open_faces(voxels.cells, features(voxels).depth)
+        lost = voxels.lost_volume * voxels.energy["fill"] / (1 - voxels.lost_volume)
+        outlook.append(least + len(voxels) - voxels.energy["fill"] + 4 * lost)
+    # They were judged by half as many samples along a cell, so a few hundredths of a face are off.
+    assert outlook[0] < outlook[1] + 0.5
+    fullest = voxelize(torus(), template, placements=6, shortlist=3, results=2)
+    for voxels in fullest:
+        least = bound.open_faces(voxels.cells, features(voxels).depth)
+        assert outlook[0] < least + len(voxels) - voxels.energy["fill"] + 0.5
+
+
+def test_what_is_judged_before_a_cut_is_what_the_cut_has():
+    template = load_template("box-3x3x2")
+    solid = torus()
+    rotations = grid_rotations(2, 1, solid.vertices)
+    energy = CellEnergy()
+    search = Refinement(solid, np.eye(3), template, rotations, energy, 4)
+    pitch, _ = search.pilot(0.1, 2)
+    (item, *_) = search.rank(np.array([pitch]), 0, 1, SilentProgress())
+    grids = [
+        grid for grid in search.refine(item, (20, 22), False, depth=True) if not grid.fit.excess
+    ]
+    assert grids
+    for grid in grids:
+        voxels, kept, _ = search.cut(grid)
+        assert kept == len(grid.fit.cells) == len(grid.depth)
+        assert np.array_equal(voxels.cells, grid.fit.cells - grid.fit.cells.min(axis=0))
+        exact = features(voxels).depth
+        assert np.abs(grid.depth - exact).mean() < 0.02
+        assert np.abs(grid.depth - exact).max() < 0.25
+    assert all(grid.depth is None for grid in search.refine(item, (20,), False))
+
+
+def test_turning_grids_a_little_never_ends_worse():
+    template = load_template("box-3x3x2")
+    solid = torus()
+    rotations = grid_rotations(4, 1, solid.vertices)
+    searches = []
+    for _ in range(2):
+        search = Refinement(solid, np.eye(3), template, rotations, CellEnergy(), 4)
+        pitch, _ = search.pilot(0.1, 4)
+        ranked = search.rank(np.array([pitch]), 0, 1, SilentProgress())
+        grids = [
+            grid
+            for item in ranked
+            for grid in search.refine(item, (20,), False, depth=True)
+            if not grid.fit.excess
+        ]
+        # As few open faces as possible, whatever else.
+        outlook = Outlook(ClosingBound(template, "S").open_faces)
+        better = grids_of_better_outlook(search, grids, outlook, 5)
+        assert better == sorted(better, key=outlook)
+        assert min(map(outlook, better)) < min(map(outlook, grids))
+        assert all(grid.fit.excess == 0 and grid.rotation >= 4 for grid in better)
+        assert set(search.family) <= set(range(4))
+        searches.append([(grid.rotation, outlook(grid)) for grid in better])
+    assert searches[0] == searches[1]

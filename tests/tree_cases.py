@@ -29,7 +29,7 @@ def face_pairs(cells):
     ).reshape(-1, 2)
 
 
-def solid_problem(cells, template, *, hinge=None, rigid=None, depth=None, weights=None):
+def solid_problem(cells, template, *, hinge=None, rigid=None, depth=None, weights=None, joints="S"):
     """Every joint possible, all cells full, unless told otherwise."""
     cells = np.array(cells, dtype=np.int32)
     pairs = face_pairs(cells)
@@ -41,6 +41,7 @@ def solid_problem(cells, template, *, hinge=None, rigid=None, depth=None, weight
         hinge=np.ones((len(pairs), 4), dtype=bool) if hinge is None else hinge,
         depth=np.zeros((len(cells), 6)) if depth is None else depth,
         weights=weights or default_weights(),
+        joints=joints,
     )
 
 

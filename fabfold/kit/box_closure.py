@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fabfold.errors import NoTreeError
 from fabfold.kit.stages import PlannedTree
 from fabfold.lattice.template import Template
 from fabfold.recipe.recipe import Recipe
 from fabfold.recipe.recipe_wishes import weights_of
-from fabfold.tree.bound import closed_at_most, closed_share
+from fabfold.tree.bound import ClosingBound, closed_at_most, closed_share
 from fabfold.tree.problem import from_features
 from fabfold.voxels.features import features
 from fabfold.voxels.voxel_model import Voxels
 
-__all__ = ["BoxClosure", "box_closure", "closing_rate"]
+__all__ = ["BoxClosure", "box_closure", "closing_rate", "open_faces"]
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,32 @@ class BoxClosure:
         )
 
 
+def open_faces(
+    recipe: Recipe, template: Template
+) -> Callable[[NDArray[np.int32], NDArray[np.float64]], float]:
+    """What voxels of a model are judged by before they are cut.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        Joints.
+    template : Template
+        The target shape, as it is filled.
+
+    Returns
+    -------
+    callable
+        Takes cells and ray depths and returns the least number of faces of the box that stay open,
+        see :meth:`fabfold.tree.bound.ClosingBound.open_faces`; 0 where voxels share cells, for
+        which the bound does not hold.
+    """
+    if recipe.share:
+        return lambda cells, depth: 0.0
+    return ClosingBound(template, recipe.joints).open_faces
+
+
 def closing_rate(recipe: Recipe, template: Template) -> Callable[[Voxels], float]:
-    """What voxelizations of a model are rated by: how far they could close the box.
+    """How far voxelizations of a model could close the box.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fabfold.kit.box_closure import closing_rate
+from fabfold.kit.box_closure import open_faces
 from fabfold.lattice.rotations import rotation_of_degrees
 from fabfold.lattice.template import Template
 from fabfold.progress import Progress
@@ -56,7 +56,7 @@ def cut_model(
             pitch=recipe.pitch,
             drop_below=recipe.drop_below,
             regions=regions,
-            rate=closing_rate(recipe, template),
+            open_faces=open_faces(recipe, template),
             progress=progress,
         )
 

@@ -161,25 +161,26 @@ class VoxelizationProblems:
         return Job(problem, LatticeFoldability(), Effort())
 
     def closing_order(self) -> list[int]:
-        """Voxelizations by how closed the box could be; with --protect by cuts.
+        """Voxelizations by how well the box is likely to be closed; with --protect by cuts.
 
-        Of the two sizes that pay (:func:`fabfold.voxels.voxelize.paying_sizes`) the best comes
-        first, then the second of both. Then come the other sizes in the same way.
+        What counts is the number of faces that must stay open, and a face more for each cell's
+        worth of space among the voxels, see :mod:`fabfold.voxels.outlook`.
         """
         if self._closing is None:
             order = list(range(len(self.options)))
             if not self.wishes.regions:
-                most = [self.at_most(option) for option in order]
-                # Of equals the fuller one.
-                order.sort(key=lambda k: (-most[k], -len(self.options[k])))
-                rank = self._size_ranks()
-                turn: dict[int, int] = {}
-                for place, option in enumerate(order):
-                    turn[option] = sum(rank[k] == rank[option] for k in order[:place])
-                paying = paying_sizes(len(self.template))
-                order.sort(key=lambda k: (rank[k] not in paying, turn[k]))
+                order.sort(key=self._outlook)
             self._closing = order
         return self._closing
+
+    def _outlook(self, option: int) -> float:
+        """Faces that must stay open, and cells' worth of space among the voxels."""
+        fill = self.options[option].fill
+        return self._least_open(option) + len(fill) - float(fill.sum())
+
+    def _least_open(self, option: int) -> float:
+        """Faces of the box that must stay open."""
+        return (1.0 - self.at_most(option)) * visible_faces(self.template)
 
     def _size_ranks(self) -> list[int]:
         """For each voxelization the number of sizes that are fuller than its own."""
@@ -202,16 +203,13 @@ class VoxelizationProblems:
         Returns
         -------
         list of int
-            Those that were not tried count as if they came as near to their bound as the best of
-            the others. Those on which nothing folded come last, and with them what was not tried
+            Those that were not tried count as if they came as near to their outlook as the best
+            of the others. Those on which nothing folded come last, and with them what was not tried
             and is of their size, where a size that pays folds: room decides.
         """
-        floor = {
-            option: (1.0 - self.at_most(option)) * visible_faces(self.template)
-            for option in range(len(self.options))
-        }
         weight = weights_of(self.recipe).surface
-        gaps = [found[option] - weight * floor[option] for option in found]
+        floor = {option: weight * self._outlook(option) for option in range(len(self.options))}
+        gaps = [found[option] - floor[option] for option in found]
         gap = min(gaps, default=0.0)
         size = [len(voxels) for voxels in self.options]
         rank, paying = self._size_ranks(), paying_sizes(len(self.template))
@@ -223,7 +221,7 @@ class VoxelizationProblems:
             alike = [found[k] for k in found if abs(size[k] - size[option]) <= _ALIKE]
             if pays and alike and min(alike) == float("inf"):
                 return float("inf")
-            return weight * floor[option] + gap
+            return floor[option] + gap
 
         return sorted(self.closing_order(), key=expected)
 

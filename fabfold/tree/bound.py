@@ -14,13 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.lattice.rotations import FACES
+from fabfold.lattice.rotations import FACE_BEFORE, FACES, ROTATION_PRODUCT, ROTATIONS
 from fabfold.lattice.template import Template
+from fabfold.tree.catalogue import JointSet, joint_types
 from fabfold.tree.fold_tree import FoldTree
-from fabfold.tree.phases import phase_labels, phase_rotations
+from fabfold.tree.phases import phase_labels, phase_of, phase_rotations
 from fabfold.tree.problem import TreeProblem
 
 __all__ = [
+    "ClosingBound",
     "PhaseBound",
     "closed_at_most",
     "closed_share",
@@ -33,11 +35,16 @@ __all__ = [
 _NEVER = 1e6
 
 
+def _shown_faces(template: Template) -> NDArray[np.bool_]:
+    """Which faces of its cells the filled shape shows, (m, 6)."""
+    cells = {tuple(cell) for cell in template.cells.tolist()}
+    beside = (template.cells[:, None] + FACES).reshape(-1, 3).tolist()
+    return np.array([tuple(cell) not in cells for cell in beside]).reshape(-1, 6)
+
+
 def visible_faces(template: Template) -> int:
     """Number of faces of a template's cells that the filled shape shows."""
-    cells = {tuple(cell) for cell in template.cells.tolist()}
-    beside = (template.cells[:, None] + FACES).reshape(-1, 3)
-    return sum(tuple(cell) not in cells for cell in beside.tolist())
+    return int(_shown_faces(template).sum())
 
 
 def closed_share(tree: FoldTree) -> float:
@@ -149,3 +156,73 @@ def closed_at_most(problem: TreeProblem) -> float:
         return 1.0
     faces = visible_faces(problem.template)
     return max(0.0, 1.0 - least_surface(problem) / problem.weights.surface / faces)
+
+
+class ClosingBound:
+    """How far voxels could close a box, from their cells and ray depths alone.
+
+    The same bound as :func:`closed_at_most`, but for voxels that are not cut yet. Many are asked
+    about, so phases that a turn of the template makes of one another are looked at once.
+
+    Parameters
+    ----------
+    template : Template
+        The target shape.
+    joints : str
+        Joint types in use, see :data:`fabfold.tree.catalogue.JOINT_SETS`.
+    """
+
+    def __init__(self, template: Template, joints: JointSet) -> None:
+        self._cells = template.cells
+        self._shown = _shown_faces(template).astype(np.float64)
+        self._labels = phase_labels(joint_types(joints))
+        self._phases = _unlike_phases(self._labels, template)
+
+    def open_faces(self, source: NDArray[np.int32], depth: NDArray[np.float64]) -> float:
+        """Least sum of mean depths behind the visible faces of the box.
+
+        Parameters
+        ----------
+        source : (n, 3) int32 array
+            Cells of the voxels in shape A, at most as many as the template has.
+        depth : (n, 6) float64 array
+            Mean depth to the first material from each of their faces, 0 to 1.
+
+        Returns
+        -------
+        float
+            0 where every face is closed, 1 more for each that is wholly open; infinite where no
+            phase has room for the colours of the voxels.
+        """
+        by_turn = depth[:, FACE_BEFORE]  # of each voxel, rotation and face of a cell
+        cost = np.zeros((len(source), len(self._cells), 24))
+        for face in range(6):
+            cost += by_turn[:, None, :, face] * self._shown[None, :, None, face]
+        empty = self._shown.sum(axis=1)
+        turns = phase_rotations(self._labels, source, self._cells)
+        bounds = (_assigned(cost, empty, turns[phase]) for phase in self._phases)
+        return min((bound.energy for bound in bounds if bound is not None), default=np.inf)
+
+
+def _unlike_phases(labels: NDArray[np.int32], template: Template) -> list[int]:
+    """Phases none of which a turn of the template onto itself makes of another."""
+    cells = template.cells
+    own = {tuple(cell) for cell in cells.tolist()}
+    turned_into: dict[int, set[int]] = {}
+    for turn in range(24):
+        turned = cells @ ROTATIONS[turn].T
+        shift = -turned.min(axis=0)
+        if {tuple(cell) for cell in (turned + shift).tolist()} != own:
+            continue
+        # Any state of a phase tells what becomes of it; the template's corner may be any cell.
+        for phase in range(int(labels.max()) + 1):
+            source, cell, rotation = np.argwhere(labels == phase)[0]
+            place = np.array(np.unravel_index(cell, (2, 2, 2)))
+            image = phase_of(
+                labels,
+                np.array(np.unravel_index(source, (2, 2, 2)), dtype=np.int32),
+                (ROTATIONS[turn] @ place + shift).astype(np.int32),
+                int(ROTATION_PRODUCT[turn, rotation]),
+            )
+            turned_into.setdefault(phase, set()).add(image)
+    return [phase for phase, images in turned_into.items() if phase == min(images)]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.lattice.rotations import FACES
+from fabfold.voxels.offsets import Planes
 from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "HINGE_REACH",
     "RIGID_CONTACT",
     "Features",
+    "box_depth",
     "contact_counts",
     "face_pairs",
     "features",
@@ -36,6 +38,8 @@ DOUBLE_CONTACT = 60
 HINGE_POSITIONS = 6
 #: ... within this many subvoxels of the edge.
 HINGE_REACH = 3
+#: Samples along a cell by which its ray depths are judged before it is cut.
+_DEPTH_SAMPLES = 10
 
 
 @dataclass(frozen=True)
@@ -193,6 +197,39 @@ def _ray_depth(subvoxels: NDArray[np.bool_]) -> NDArray[np.float64]:
             first = np.where(rays.any(axis=axis + 1), rays.argmax(axis=axis + 1), side)
             depth[:, 2 * axis + sign] = first.mean(axis=(1, 2)) / side
     return depth
+
+
+def box_depth(
+    inside: NDArray[np.bool_], planes: Planes, cells: NDArray[np.integer]
+) -> NDArray[np.float64]:
+    """Ray depths of cells that are boxes between moved planes, before anything is cut.
+
+    Parameters
+    ----------
+    inside : (x, y, z) bool array
+        Material of the model, by subvoxel; there is none outside.
+    planes : three int64 arrays
+        Ascending plane positions, in subvoxels.
+    cells : (n, 3) int array
+        Between which planes each cell lies.
+
+    Returns
+    -------
+    (n, 6) float64 array
+        As `Features.depth`, up to the distance of the samples.
+    """
+    share = (np.arange(_DEPTH_SAMPLES) + 0.5) / _DEPTH_SAMPLES
+    at = []
+    material = np.ones((len(cells), 1, 1, 1), dtype=bool)
+    for axis in range(3):
+        low = planes[axis][cells[:, axis]]
+        width = planes[axis][cells[:, axis] + 1] - low
+        sample = np.floor(low[:, None] + width[:, None] * share).astype(np.int64)
+        line = [len(cells), 1, 1, 1]
+        line[axis + 1] = _DEPTH_SAMPLES
+        material = material & ((sample >= 0) & (sample < inside.shape[axis])).reshape(line)
+        at.append(np.clip(sample, 0, inside.shape[axis] - 1).reshape(line))
+    return _ray_depth(material & inside[at[0], at[1], at[2]])
 
 
 def features(voxels: Voxels) -> Features:

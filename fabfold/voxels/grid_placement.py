@@ -71,6 +71,8 @@ class GridFit:
         Kept cells for which the template has no cell of their colour.
     fills : (kept,) float64 array
         Share of each kept cell that is material, ascending.
+    cells : (kept, 3) int64 array
+        Which cells of the grid are kept.
     """
 
     score: float
@@ -80,6 +82,7 @@ class GridFit:
     lost: float
     excess: int
     fills: NDArray[np.float64] = field(repr=False, compare=False)
+    cells: NDArray[np.int64] = field(repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -384,6 +387,7 @@ def grid_fit(fills: NDArray[np.float64], energy: CellEnergy, capacity: Capacity)
         lost=float(lost),
         excess=int(excess),
         fills=np.sort(fills[keep]),
+        cells=np.argwhere(keep),
     )
 
 

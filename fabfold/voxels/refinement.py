@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from fabfold.progress import Progress
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.scan import TIE, box_counts, summed_volume
 from fabfold.voxels.cut import Placement, cut_voxels
+from fabfold.voxels.features import box_depth
+from fabfold.voxels.fine_scan import FineScan, fine_scan, grid_shape
 from fabfold.voxels.grid_placement import (
     SCORE_DIGITS,
     Capacity,
@@ -29,15 +31,15 @@ from fabfold.voxels.grid_placement import (
     rank_translations,
 )
 from fabfold.voxels.offsets import CellEnergy, Offsets, optimise_offsets
+from fabfold.voxels.refined_grid import RefinedGrid
 from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 
-__all__ = ["PITCHES", "RefinedGrid", "Refinement"]
+__all__ = ["PITCHES", "Refinement"]
 
 #: Subvoxels along a voxel in the first round.
 _COARSE = 10
-#: Most subvoxels of a scan: a coarse one of a longer model is made coarser, a fine one left out.
+#: Most subvoxels of a coarse scan: that of a longer model is made coarser.
 _COARSE_LIMIT = 3_000_000
-_FINE_LIMIT = 40_000_000
 #: Pitches of the second round, in twentieths of the pitch that the first round chose.
 PITCHES = (17, 18, 19, 20, 21)
 #: Pitches of the third round, as shares of the best so far.
@@ -57,32 +59,6 @@ _MOST_FITTED = 8
 _SAME = 1e-6
 #: Grids of a rotation whose planes are moved in the first round.
 _MOVED = 4
-
-
-@dataclass(frozen=True)
-class RefinedGrid:
-    """A grid with its planes moved on a fine scan, and how it fits.
-
-    Attributes
-    ----------
-    fit : GridFit
-        How well its cells fit the model and the template.
-    rotation : int
-        Index into :attr:`Refinement.rotations`.
-    placement : Placement
-        The grid, its planes moved.
-    """
-
-    fit: GridFit
-    rotation: int
-    placement: Placement
-
-    @property
-    def sort_key(self) -> tuple[int, float]:
-        """Orders grids: those that fit come first, by score; then the others, by excess cells."""
-        if self.fit.excess == 0:
-            return (0, -self.fit.score)
-        return (1, float(self.fit.excess))
 
 
 def _shift(row: int) -> NDArray[np.int64]:
@@ -166,7 +142,11 @@ class Refinement:
         vertices = self.vertices @ self.rotations[rotation].T
         low, extent = vertices.min(axis=0), np.ptp(vertices, axis=0)
         side = max(side, float(np.cbrt(np.prod(extent) / _COARSE_LIMIT)), float(extent.max()) / 512)
-        return summed_volume((vertices - low) / side, self.faces, _shape(extent, side)), side, low
+        return (
+            summed_volume((vertices - low) / side, self.faces, grid_shape(extent, side)),
+            side,
+            low,
+        )
 
     def pitch_range(self) -> tuple[float, float]:
         """Smallest and largest pitch that can make sense.
@@ -255,9 +235,7 @@ class Refinement:
             if index == given:
                 ranked.sort(key=lambda item: -item.score)
                 best = list(dict.fromkeys(item.rotation for item in ranked))[:_CENTRES]
-                turned = nearby_rotations(self.rotations[best], nearby, seed, _SPREAD_DEG)
-                self.rotations = np.concatenate([self.rotations, turned])
-                self.family.extend(best[turn % len(best)] for turn in range(nearby))
+                self._turn(best, nearby, seed, _SPREAD_DEG)
             mine = self._ranked(index, pitches)
             for pitch in self._fitted(index, pitches):
                 mine.extend(self._ranked(index, np.array([pitch])))
@@ -269,15 +247,21 @@ class Refinement:
         ranked.sort(key=lambda item: -item.score)
         return ranked
 
+    def _turn(self, best: Sequence[int], count: int, seed: int, spread_deg: float) -> None:
+        """Add small turns of rotations, each getting one after another."""
+        turned = nearby_rotations(self.rotations[list(best)], count, seed, spread_deg)
+        self.rotations = np.concatenate([self.rotations, turned])
+        self.family.extend(self.family[best[turn % len(best)]] for turn in range(count))
+
     def rank_again(
-        self, ranked: Sequence[RankedGrid], pitches: NDArray[np.float64]
+        self, rotations: Sequence[int], pitches: NDArray[np.float64]
     ) -> list[RankedGrid]:
         """Rank grids of the rotations that did best in another search.
 
         Parameters
         ----------
-        ranked : sequence of RankedGrid
-            What :meth:`rank` of the other search gave, best first.
+        rotations : sequence of int
+            Numbers of the rotations, best first; each may come several times.
         pitches : (p,) float64 array
             Sides of a voxel to try, model units.
 
@@ -286,7 +270,7 @@ class Refinement:
         list of RankedGrid
             The best one of each rotation, best first.
         """
-        best = list(dict.fromkeys(item.rotation for item in ranked))[:_AGAIN]
+        best = list(dict.fromkeys(rotations))[:_AGAIN]
         found = [
             max(self._ranked(rotation, pitches), key=lambda item: item.score) for rotation in best
         ]
@@ -365,7 +349,7 @@ class Refinement:
         return replace(fit, score=round(score, SCORE_DIGITS))
 
     def refine(
-        self, item: RankedGrid, pitches: tuple[int, ...], hold_origin: bool
+        self, item: RankedGrid, pitches: tuple[int, ...], hold_origin: bool, depth: bool = False
     ) -> list[RefinedGrid]:
         """Scan at 20 x 20 x 20 and move the planes of several grids near a ranked one.
 
@@ -377,48 +361,33 @@ class Refinement:
             Sides of a voxel to try, in twentieths of the pitch of `item`.
         hold_origin : bool
             Try no other translation; `pitches` must be ``(20,)``.
+        depth : bool
+            Look at the ray depths of grids that fit.
 
         Returns
         -------
         list of RefinedGrid
             In the order in which they were tried; empty where a scan would take too much memory.
         """
-        rotation = self.rotations[item.rotation]
-        vertices = self.vertices @ rotation.T
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
-        side = item.pitch / SUBDIVISION
-        # The table begins on a plane of the grid, so that its planes are at whole subvoxels.
-        corner = np.array(item.origin) - 0.5 * item.pitch
-        start = corner + np.floor((low - corner) / item.pitch - TIE) * item.pitch
-        shape = _shape(high - start, side)
-        if float(np.prod(np.array(shape, dtype=float))) > _FINE_LIMIT:
+        vertices = self.vertices @ self.rotations[item.rotation].T
+        scan = fine_scan(vertices, self.faces, item, depth)
+        if scan is None:
             return []
-        table = summed_volume((vertices - start) / side, self.faces, shape)
-        inside = np.maximum(np.floor((low - start) / side + TIE), 0).astype(np.int64)
-        window = np.ascontiguousarray(table[inside[0] :, inside[1] :, inside[2] :])
-        results = []
+        results: list[RefinedGrid] = []
         for units in pitches:
             shifts = [np.zeros(3, dtype=np.int64)] if units == SUBDIVISION else []
             if not hold_origin:
-                rows = rank_translations(window, units, _STEPS, self.energy, self.capacity)
+                rows = rank_translations(scan.window, units, _STEPS, self.energy, self.capacity)
                 for row in np.argsort(-rows[:, 0], kind="stable")[:2]:
                     step = np.floor(_shift(int(row)) * (units / _STEPS) + 0.5).astype(np.int64)
-                    if not (units == SUBDIVISION and np.array_equal(step, inside)):
-                        shifts.append(inside - step)
-            for shift in shifts:
-                results.append(self._moved(table, item.rotation, start, side, units, shift))
+                    if not (units == SUBDIVISION and np.array_equal(step, scan.first)):
+                        shifts.append(scan.first - step)
+            results.extend(self._moved(scan, units, shift) for shift in shifts)
         return results
 
-    def _moved(
-        self,
-        table: NDArray[np.int32],
-        rotation: int,
-        start: NDArray[np.float64],
-        side: float,
-        units: int,
-        shift: NDArray[np.int64],
-    ) -> RefinedGrid:
+    def _moved(self, scan: FineScan, units: int, shift: NDArray[np.int64]) -> RefinedGrid:
         """Move the planes of the grid of pitch `units` whose first planes are at `shift`."""
+        table, start, side = scan.table, scan.start, scan.side
         regular = []
         for axis in range(3):
             # One empty cell on each side: the outermost planes stand still, outside the model.
@@ -430,21 +399,26 @@ class Refinement:
         fit = self._fit(table, moved, side, pitch)
         offsets = [moved.offsets[axis] / units for axis in range(3)]
         placement = Placement(
-            rotation=self.rotations[rotation],
+            rotation=self.rotations[scan.rotation],
             origin=start + shift * side + 0.5 * pitch,
             pitch=pitch,
             first=np.full(3, -1, dtype=np.int64),
             offsets=(offsets[0], offsets[1], offsets[2]),
         )
-        return RefinedGrid(fit, rotation, placement)
+        depth = None
+        if scan.material is not None and fit.excess == 0:
+            depth = box_depth(scan.material, moved.planes, fit.cells)
+        return RefinedGrid(fit, scan.rotation, placement, depth)
 
-    def refine_pitch(self, grid: RefinedGrid) -> list[RefinedGrid]:
+    def refine_pitch(self, grid: RefinedGrid, depth: bool = False) -> list[RefinedGrid]:
         """Try pitches in between, the grid scaled about the model's middle.
 
         Parameters
         ----------
         grid : RefinedGrid
             The grid to scale.
+        depth : bool
+            As in :meth:`refine`.
 
         Returns
         -------
@@ -452,14 +426,50 @@ class Refinement:
             In the order in which they were tried.
         """
         placement = grid.placement
-        vertices = self.vertices @ placement.rotation.T
-        middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        middle = self._middle(placement.rotation)
         found = []
         for factor in _NEARBY:
             x, y, z = (middle + factor * (placement.origin - middle)).tolist()
             item = RankedGrid(0.0, grid.rotation, placement.pitch * factor, (x, y, z))
-            found.extend(self.refine(item, (SUBDIVISION,), hold_origin=False))
+            found.extend(self.refine(item, (SUBDIVISION,), False, depth))
         return found
+
+    def refine_turned(
+        self, grids: Sequence[RefinedGrid], count: int, seed: int, spread_deg: float
+    ) -> list[RefinedGrid]:
+        """Try small turns of grids about the model's middle; they are added to `rotations`.
+
+        Parameters
+        ----------
+        grids : sequence of RefinedGrid
+            The grids to turn.
+        count : int
+            Number of turns; each of the grids gets one after another.
+        seed : int
+            Of the turns.
+        spread_deg : float
+            Standard deviation of a turn about each axis, degrees.
+
+        Returns
+        -------
+        list of RefinedGrid
+            In the order in which they were tried, with ray depths.
+        """
+        first = len(self.rotations)
+        self._turn([grid.rotation for grid in grids], count, seed, spread_deg)
+        found = []
+        for turn in range(count):
+            placement = grids[turn % len(grids)].placement
+            middle = self._middle(self.rotations[first + turn]) - self._middle(placement.rotation)
+            x, y, z = (placement.origin + middle).tolist()
+            item = RankedGrid(0.0, first + turn, placement.pitch, (x, y, z))
+            found.extend(self.refine(item, (SUBDIVISION,), False, depth=True))
+        return found
+
+    def _middle(self, rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Middle of the model's bounding box along the axes of a grid."""
+        vertices = self.vertices @ rotation.T
+        return np.asarray((vertices.min(axis=0) + vertices.max(axis=0)) / 2)
 
     def placement(self, grid: RefinedGrid) -> Placement:
         """The grid for the model as it was given.
@@ -484,8 +494,3 @@ class Refinement:
         )
         # Cut as it was looked at, so that what is a tie there is not decided otherwise here.
         return (None if voxels is None else voxels.in_axes(self.axes)), kept, excess
-
-
-def _shape(extent: NDArray[np.float64], side: float) -> tuple[int, int, int]:
-    x, y, z = np.maximum(np.ceil(extent / side - TIE), 1).astype(int).tolist()
-    return (x, y, z)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,9 @@ from fabfold.solid.own_axes import own_axes
 from fabfold.solid.regions import Region
 from fabfold.voxels.grid_placement import RankedGrid, grid_rotations
 from fabfold.voxels.offsets import CellEnergy
-from fabfold.voxels.refinement import PITCHES, RefinedGrid, Refinement
+from fabfold.voxels.outlook import OpenFaces, Outlook, grids_of_better_outlook, two_of_a_family
+from fabfold.voxels.refined_grid import RefinedGrid, unlike
+from fabfold.voxels.refinement import PITCHES, Refinement
 from fabfold.voxels.region_cells import region_cut_cost
 from fabfold.voxels.voxel_model import SUBDIVISION, Voxels
 
@@ -32,18 +34,15 @@ _REFINED = 6
 _LARGER = ((22, 23), (24, 25), (26, 28), (30, 33), (36, 40))
 #: Placements of one size that are cut, until as many as wanted will do.
 _TRIES = 16
-#: Placements of one size that are cut and rated, and cells of all of them together: on a large
-#: template a rating takes long.
-_RATED = 20
-_RATED_CELLS = 1280
+#: Cells of all placements of one size together whose outlook is judged: on a large template a
+#: judgement takes long.
+_JUDGED_CELLS = 8192
 #: Templates of more cells are large: what folds in them mostly leaves much of them free.
 LARGE = 72
-#: Sizes that are worth a search, the fullest that mostly fold: emptier ones close the box less.
+#: Sizes that are worth a search where a template is not large: emptier ones close the box less.
 _PAYING = 2
-#: Digits of a rating: more than these depend on rounding, and so on how the model lies.
-_RATING_DIGITS = 4
-#: Two voxelizations whose sorted fills differ by less than this on average are the same.
-_SAME_FILL = 0.012
+#: Grids of the best outlook whose rotations other sizes start from.
+_PASSED_ON = 10
 #: Voxelizations of different size that are looked for, and how much of a template the smallest
 #: leaves free: this, times the cube root of the number of its cells. Folding into a box that is
 #: full to the last cell is hard, and the harder the larger it is; with gaps, which may lie inside,
@@ -64,14 +63,14 @@ def voxelize(
     rotation: ArrayLike | None = None,
     origin: ArrayLike | None = None,
     pitch: float | None = None,
-    placements: int = 300,
+    placements: int = 160,
     shortlist: int = 64,
     results: int = 8,
     drop_below: float = 0.04,
     max_offset: int = 4,
     max_loss: float = MAX_LOSS,
     regions: Sequence[Region] = (),
-    rate: Callable[[Voxels], float] | None = None,
+    open_faces: OpenFaces | None = None,
     progress: Progress | None = None,
 ) -> list[Voxels]:
     """Cut a solid into voxels that the template can hold.
@@ -105,16 +104,17 @@ def voxelize(
         Largest share of the model's volume that may be lost in dropped cells.
     regions : sequence of Region
         Parts of the model that shall lie in few cells; each cell more costs as much as a sliver.
-    rate : callable, optional
-        Says of voxels how good they are, the more the better: of more placements than are wanted
-        half of those that are taken are rated best. Not where there are `regions`.
+    open_faces : callable, optional
+        Takes the (n, 3) cells of voxels and their (n, 6) ray depths and says how many faces of the
+        box must stay open. Of the sizes that pay, those of the best outlook are taken then, see
+        :mod:`fabfold.voxels.outlook`, and not those of most fill. Not where there are `regions`.
     progress : Progress, optional
         Hears of the stages of the search.
 
     Returns
     -------
     list of Voxels
-        Different ones, best first: rated best; of equals those of most total fill, less 0.5 a
+        Different ones, best first: of best outlook, then those of most total fill, less 0.5 a
         sliver, less lost material. The counts of both checkerboard colours fit the template, and
         the voxels hang together through printed contacts. Of four, three leave a part of the
         template free, each more than the one before, see :func:`fill_shares`; not where `pitch` or
@@ -160,18 +160,30 @@ def voxelize(
     else:
         x, y, z = centre.tolist()
         ranked = [RankedGrid(0.0, 0, float(value), (x, y, z)) for value in pitches]
+    turns = [item.rotation for item in ranked]
     shares = fill_shares(len(template))[:results] if free else (1.0,)
+    outlook = None if open_faces is None or regions else Outlook(open_faces)
+    paying = paying_sizes(len(template))
+    # One of each size, and more of those that pay.
+    counts = [1] * len(shares)
+    for more in range(results - len(shares)):
+        counts[more % min(len(paying), len(shares))] += 1
     chosen: list[RefinedGrid] = []
-    done: list[_RatedCut] = []
+    done: list[_CutGrid] = []
     for place, share in enumerate(shares):
-        count = len(range(place, results, len(shares)))
+        count = counts[place]
         here, some = refinement, ranked if centre is not None else ranked[:shortlist]
         if place > 0:
             here = refinement.with_share(share)
-            some = here.rank_again(ranked, pitches * share ** (-1 / 3))
+            some = here.rank_again(turns, pitches * share ** (-1 / 3))
             some = some[: max(1, shortlist // _FEWER)]
-        found = _refined_grids(here, some, free, centre is not None, regions)
-        judge = rate if place in paying_sizes(len(template)) and not regions else None
+        judge = outlook if place in paying else None
+        found = _refined_grids(here, some, free, centre is not None, regions, judge is not None)
+        if judge and free and rotation is None and place == 0:
+            better = grids_of_better_outlook(here, unlike(found, [], _judged(here)), judge, seed)
+            found = sorted(found + better, key=lambda grid: grid.sort_key)
+            # The other sizes start from these turns too.
+            turns = [grid.rotation for grid in better[:_PASSED_ON]] + turns
         done += _finish(here, found, chosen, count, max_loss, regions, judge)
         if place == 0:
             full = found
@@ -211,10 +223,9 @@ def paying_sizes(cells: int) -> range:
     Returns
     -------
     range
-        Their places in :func:`fill_shares`: the fullest two, of large templates the emptiest two.
+        Their places in :func:`fill_shares`: the fullest two, of large templates all.
     """
-    first = _SIZES - _PAYING if cells > LARGE else 0
-    return range(first, first + _PAYING)
+    return range(len(fill_shares(cells)) if cells > LARGE else _PAYING)
 
 
 def _refined_grids(
@@ -223,22 +234,23 @@ def _refined_grids(
     free: bool,
     hold_origin: bool,
     regions: Sequence[Region],
+    depth: bool,
 ) -> list[RefinedGrid]:
     """Grids near those ranked best, with their planes moved, best first."""
     units = PITCHES if free else (SUBDIVISION,)
     found: list[RefinedGrid] = []
     for item in ranked:
-        found.extend(refinement.refine(item, units, hold_origin))
+        found.extend(refinement.refine(item, units, hold_origin, depth))
     found.sort(key=lambda grid: grid.sort_key)
     if free:
         for step in _LARGER:
             if found and found[0].fit.excess == 0:
                 break
             for item in ranked[:_REFINED]:
-                found.extend(refinement.refine(item, step, False))
+                found.extend(refinement.refine(item, step, False, depth))
             found.sort(key=lambda grid: grid.sort_key)
         for grid in _different(found)[:_REFINED]:
-            found.extend(refinement.refine_pitch(grid))
+            found.extend(refinement.refine_pitch(grid, depth))
         found.sort(key=lambda grid: grid.sort_key)
     if regions:
         price = {id(grid): region_cut_cost(regions, refinement.placement(grid)) for grid in found}
@@ -335,35 +347,11 @@ def _different(found: list[RefinedGrid]) -> list[RefinedGrid]:
     return best
 
 
-def _shortlist(
-    refinement: Refinement, found: Sequence[RefinedGrid], before: Sequence[RefinedGrid], count: int
-) -> list[RefinedGrid]:
-    """Up to `count` grids that fit, best first, unlike each other and unlike those `before`."""
-    chosen: list[RefinedGrid] = []
-    used: dict[int, int] = {}
-    for grid in found:
-        fills = grid.fit.fills
-        family = refinement.family[grid.rotation]
-        if grid.fit.excess > 0 or used.get(family, 0) == 2:
-            continue
-        if any(
-            len(fills) == len(other.fit.fills)
-            and np.abs(fills - other.fit.fills).mean() < _SAME_FILL
-            for other in [*before, *chosen]
-        ):
-            continue
-        chosen.append(grid)
-        used[family] = used.get(family, 0) + 1
-        if len(chosen) == count:
-            break
-    return chosen
-
-
 @dataclass(frozen=True)
-class _RatedCut:
-    """A grid that was cut: its rating, its price, the lower the better, and its voxels."""
+class _CutGrid:
+    """A grid that was cut: its outlook and its price, the lower the better, and its voxels."""
 
-    rating: float
+    outlook: float
     price: float
     grid: RefinedGrid
     voxels: Voxels
@@ -371,7 +359,12 @@ class _RatedCut:
     @property
     def sort_key(self) -> tuple[float, float]:
         """Orders cuts, best first."""
-        return (-self.rating, self.price)
+        return (self.outlook, self.price)
+
+
+def _judged(refinement: Refinement) -> int:
+    """How many grids of one size are judged by their outlook."""
+    return max(_TRIES, _JUDGED_CELLS // refinement.capacity.cells)
 
 
 def _finish(
@@ -381,34 +374,29 @@ def _finish(
     count: int,
     max_loss: float,
     regions: Sequence[Region],
-    rate: Callable[[Voxels], float] | None,
-) -> list[_RatedCut]:
-    """Cut the best grids and check the voxels; of those that will do, `count` are taken.
+    outlook: Outlook | None,
+) -> list[_CutGrid]:
+    """Cut the best grids and check the voxels, until `count` will do.
 
     Grids that are taken are added to `chosen`; a grid like an earlier one is passed over.
     """
-    tries, wanted = _TRIES, count
-    if rate is not None:
-        wanted = max(count, min(_RATED, _RATED_CELLS // refinement.capacity.cells))
-        tries = max(tries, wanted)
-    done: list[_RatedCut] = []
+    if outlook is None:
+        grids = unlike(found, chosen, len(found))
+    else:
+        grids = sorted(unlike(found, chosen, _judged(refinement)), key=outlook)
     # Sampling the warped model can still cost a cell its place, so some more than are wanted.
-    for grid in _shortlist(refinement, found, chosen, tries) or found[:tries]:
+    grids = two_of_a_family(refinement, grids)[:_TRIES]
+    done: list[_CutGrid] = []
+    for grid in grids or found[:_TRIES]:
         voxels, _, _ = refinement.cut(grid)
         if voxels is None or voxels.lost_volume > max_loss:
             continue
         price = region_cut_cost(regions, refinement.placement(grid)) - voxels.energy["score"]
-        rating = 0.0 if rate is None else round(rate(voxels), _RATING_DIGITS)
-        done.append(_RatedCut(rating, price, grid, voxels))
-        if len(done) == wanted:
+        judged = np.inf if outlook is None or grid.depth is None else outlook(grid)
+        done.append(_CutGrid(judged, price, grid, voxels))
+        chosen.append(grid)
+        if len(done) == count:
             break
-    if rate is not None:
-        # The other half by price: full cells hold together where a high rating may not.
-        rated = sorted(done, key=lambda cut: cut.sort_key)
-        best = rated[: -(-count // 2)]
-        others = sorted(rated[len(best) :], key=lambda cut: cut.price)
-        done = best + others[: count - len(best)]
-    chosen += [cut.grid for cut in done]
     return done
 
 
