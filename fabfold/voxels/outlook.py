@@ -1,9 +1,9 @@
 """How well a box of voxels is likely to be closed, said before they are cut, and grids with more.
 
 A box is closed by what its voxels have at their faces, and how near a search comes to that depends
-on how full the voxels are (Eq. 1 of the paper). Over some eighty voxelizations of the bunny, the
-kitten and the dragon, the energy of the trees went up as much for one face that must stay open as
-for one cell's worth of space among the voxels; the sum explains most of it.
+on how full the voxels are (Eq. 1 of the paper). The energy of trees goes up about as much with one
+face that must stay open as with one cell's worth of space among the voxels, and the sum explains
+most of it (``benchmarks/voxel_choice.py``).
 
 References
 ----------
@@ -34,6 +34,8 @@ _DIGITS = 2
 _TURNED, _TURNS, _SPREAD_DEG, _NARROWER, _ROUNDS = 4, 24, 3.0, 0.6, 3
 #: Grids that such a round goes on with.
 _POOL = 64
+#: An outlook that needs to be no better: not one face is open.
+_CLOSED = 1.0
 
 
 class Outlook:
@@ -83,7 +85,9 @@ def grids_of_better_outlook(
     """
     pool = sorted(grids, key=outlook)
     found: list[RefinedGrid] = []
-    for number in range(_ROUNDS if pool else 0):
+    for number in range(_ROUNDS):
+        if not pool or outlook(pool[0]) < _CLOSED:
+            break
         best = two_of_a_family(refinement, pool)[:_TURNED]
         spread = _SPREAD_DEG * _NARROWER**number
         tried = refinement.refine_turned(best, _TURNS, seed + number, spread)

@@ -34,8 +34,8 @@ _REFINED = 6
 _LARGER = ((22, 23), (24, 25), (26, 28), (30, 33), (36, 40))
 #: Placements of one size that are cut, until as many as wanted will do.
 _TRIES = 16
-#: Cells of all placements of one size together whose outlook is judged: on a large template a
-#: judgement takes long.
+#: Cells of all placements of one size together whose outlook is judged, of templates of up to 64
+#: cells; of larger ones fewer, for a judgement takes the longer.
 _JUDGED_CELLS = 8192
 #: Templates of more cells are large: what folds in them mostly leaves much of them free.
 LARGE = 72
@@ -364,7 +364,8 @@ class _CutGrid:
 
 def _judged(refinement: Refinement) -> int:
     """How many grids of one size are judged by their outlook."""
-    return max(_TRIES, _JUDGED_CELLS // refinement.capacity.cells)
+    cells = refinement.capacity.cells
+    return max(_TRIES, int(_JUDGED_CELLS * min(1.0, 64 / cells)) // cells)
 
 
 def _finish(
