@@ -8,7 +8,13 @@ import pytest
 import trimesh
 
 from fabfold.solid.convert import to_manifold
-from fabfold.solid.scan import TIE, box_counts, scan_mesh, summed_volume
+from fabfold.solid.scan import (
+    TIE,
+    box_counts,
+    scan_and_summed_volume,
+    scan_mesh,
+    summed_volume,
+)
 from fabfold.voxels.offsets import CellEnergy, best_axis_offsets, cell_energy, optimise_offsets
 from fabfold.voxels.warp import split_at_plane, warp_mesh
 
@@ -89,6 +95,9 @@ def test_summed_volume_table_counts_boxes():
     grid = scan_mesh(centred, faces, shape)
     table = summed_volume(centred, faces, shape)
     assert table[-1, -1, -1] == grid.sum()
+    inside, both = scan_and_summed_volume(centred, faces, shape)
+    assert np.array_equal(inside, grid)
+    assert np.array_equal(both, table)
     planes = tuple(np.array([-3, 0, 5, 7, n, n + 4], dtype=np.int64) for n in shape)
     counts = box_counts(table, planes)
     for i, j, k in np.ndindex(counts.shape):

@@ -15,7 +15,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["TIE", "box_counts", "box_counts_kernel", "scan_mesh", "summed_volume"]
+__all__ = [
+    "TIE",
+    "box_counts",
+    "box_counts_kernel",
+    "scan_and_summed_volume",
+    "scan_mesh",
+    "summed_volume",
+]
 
 #: So that what lies just half-way falls one way whatever the unit, place and direction of the model
 #: and whatever the rounding of its file, in subvoxels: a flat face through centres of subvoxels, a
@@ -199,6 +206,27 @@ def summed_volume(
         Entry ``(i, j, k)`` counts the subvoxels with material whose three indices are all below it.
     """
     return np.asarray(_summed(_winding_steps(vertices, faces, *shape)))
+
+
+def scan_and_summed_volume(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], shape: tuple[int, int, int]
+) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
+    """What :func:`scan_mesh` and :func:`summed_volume` give, by one scan.
+
+    Parameters
+    ----------
+    vertices, faces, shape
+        As for both.
+
+    Returns
+    -------
+    inside : bool array of `shape`
+        True where there is material.
+    table : int32 array, one longer than `shape` on each axis
+        Counts of it.
+    """
+    steps = _winding_steps(vertices, faces, *shape)
+    return np.asarray(_inside(steps)), np.asarray(_summed(steps))
 
 
 def box_counts(

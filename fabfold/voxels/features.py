@@ -192,9 +192,10 @@ def _ray_depth(subvoxels: NDArray[np.bool_]) -> NDArray[np.float64]:
     depth = np.empty((len(subvoxels), 6))
     side = subvoxels.shape[1]
     for axis in range(3):
+        hit = subvoxels.any(axis=axis + 1)
         for sign in range(2):
             rays = np.flip(subvoxels, axis=axis + 1) if sign == 0 else subvoxels
-            first = np.where(rays.any(axis=axis + 1), rays.argmax(axis=axis + 1), side)
+            first = np.where(hit, rays.argmax(axis=axis + 1), side)
             depth[:, 2 * axis + sign] = first.mean(axis=(1, 2)) / side
     return depth
 

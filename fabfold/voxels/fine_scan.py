@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.solid.scan import TIE, summed_volume
+from fabfold.solid.scan import TIE, scan_and_summed_volume, summed_volume
 from fabfold.voxels.grid_placement import RankedGrid
 from fabfold.voxels.voxel_model import SUBDIVISION
 
@@ -76,11 +76,15 @@ def fine_scan(
     shape = grid_shape(high - start, side)
     if float(np.prod(np.array(shape, dtype=float))) > _LIMIT:
         return None
-    table = summed_volume((vertices - start) / side, faces, shape)
+    inside = None
+    if material:
+        inside, table = scan_and_summed_volume((vertices - start) / side, faces, shape)
+    else:
+        table = summed_volume((vertices - start) / side, faces, shape)
     first = np.maximum(np.floor((low - start) / side + TIE), 0).astype(np.int64)
     return FineScan(
         table,
-        np.diff(np.diff(np.diff(table, axis=0), axis=1), axis=2) > 0 if material else None,
+        inside,
         np.ascontiguousarray(table[first[0] :, first[1] :, first[2] :]),
         first,
         item.rotation,
