@@ -4,7 +4,7 @@
     python benchmarks/voxel_choice.py --trees [NAME ...]
 
 Each model is cut twice in one process: once as the voxelizations of most fill come, once as those
-of the best outlook. With ``--trees`` many voxelizations of a model are searched, two seeds each,
+of the least openness. With ``--trees`` many voxelizations of a model are searched, two seeds each,
 and the energy of their trees is explained by what is known of the voxels before; the figures are
 kept in ``voxel_choice.json``. Names as in ``energies.py``; models that are not there are left out.
 The page is written where all are measured.
@@ -46,7 +46,7 @@ REASONS = (
     ("faces that must stay open", ("open",)),
     ("faces, space", ("open", "space")),
     ("faces, space, number of voxels", ("open", "space", "voxels")),
-    ("outlook: faces + space", ("outlook",)),
+    ("openness: faces + space", ("openness",)),
 )
 
 
@@ -66,13 +66,13 @@ def known(voxels: Any, kit: Kit) -> dict[str, float]:
         "fill": float(voxels.fill.sum()),
         "open": least,
         "space": space,
-        "outlook": least + space,
+        "openness": least + space,
         "lost": voxels.lost_volume,
     }
 
 
 def row(name: str, models: Path) -> str:
-    """The sizes that pay by fill and by outlook, and processor seconds."""
+    """The sizes that pay by fill and by openness, and processor seconds."""
     kit = kit_of(name, models)
     solid, template = kit.solid(), kit.template
     cells, seconds = [], []
@@ -81,10 +81,10 @@ def row(name: str, models: Path) -> str:
         start = time.process_time()
         found = voxelize(solid, template, seed=1, open_faces=judge)
         seconds.append(time.process_time() - start)
-        facts = sorted((known(v, kit) for v in found), key=lambda fact: fact["outlook"])
+        facts = sorted((known(v, kit) for v in found), key=lambda fact: fact["openness"])
         told = [
             f"{fact['voxels']}: {1 - fact['open'] / visible_faces(template):.3f} "
-            f"({fact['outlook']:.1f})"
+            f"({fact['openness']:.1f})"
             for fact in facts[:3]
         ]
         cells.append(", ".join(told))
@@ -92,7 +92,7 @@ def row(name: str, models: Path) -> str:
 
 
 def many_voxels(kit: Kit) -> list[Any]:
-    """Voxelizations of the two fullest sizes, as different as they come, by outlook."""
+    """Voxelizations of the two fullest sizes, as different as they come, by openness."""
     solid, template = kit.solid(), kit.template
     axes = own_axes(solid.vertices, solid.faces)
     solid = solid.in_axes(axes)
@@ -113,11 +113,11 @@ def many_voxels(kit: Kit) -> list[Any]:
             voxels, _, _ = here.cut(grid)
             if voxels is not None and voxels.lost_volume < MAX_LOSS:
                 taken.append(voxels)
-    return sorted(taken, key=lambda voxels: known(voxels, kit)["outlook"])
+    return sorted(taken, key=lambda voxels: known(voxels, kit)["openness"])
 
 
 def trees_of(name: str, models: Path) -> list[dict[str, float]]:
-    """Search voxelizations of a model that lie far apart in their outlook."""
+    """Search voxelizations of a model that lie far apart in their openness."""
     kit = kit_of(name, models)
     found = many_voxels(kit)
     # Half of them the best, the others evenly down to the worst.
@@ -176,7 +176,7 @@ def page(choice: list[str], rows: dict[str, list[dict[str, float]]]) -> str:
         "",
         "Written by `python benchmarks/voxel_choice.py`.",
         "",
-        "## Why those of the best outlook",
+        "## Why those of the least openness",
         "",
         f"{count} voxelizations of {', '.join(rows)} (`--trees`), {len(SEEDS)} seeds each; single",
         "hinges. *Faces* is the number of faces of the box that must stay open with these voxels,",
@@ -187,12 +187,12 @@ def page(choice: list[str], rows: dict[str, list[dict[str, float]]]) -> str:
         "",
         "## Which they are",
         "",
-        "Of eight voxelizations those three of the best outlook: number of voxels, the share to",
-        "which they could close the box at most, and the outlook in brackets (the lower the",
+        "Of eight voxelizations those three of the least openness: number of voxels, the share to",
+        "which they could close the box at most, and the openness in brackets (the lower the",
         "better; what is lost is not counted here). Left: voxelizations of most fill. Right: those",
         "that are searched. Processor seconds of cutting.",
         "",
-        "| model | most fill | best outlook | s | s |",
+        "| model | most fill | least openness | s | s |",
         "|---|---|---|--:|--:|",
         *choice,
     ]

@@ -22,7 +22,7 @@ from fabfold.voxels.grid_placement import (
     rank_translations,
 )
 from fabfold.voxels.offsets import CellEnergy
-from fabfold.voxels.outlook import Outlook, grids_of_better_outlook
+from fabfold.voxels.openness import Openness, grids_of_less_openness
 from fabfold.voxels.refinement import Refinement
 from fabfold.voxels.voxel_files import save_voxels
 from fabfold.voxels.voxel_model import Voxels
@@ -333,7 +333,7 @@ def test_ranked_translations_agree_with_judge():
 
 @pytest.fixture(scope="module")
 def judged():
-    """A torus cut by its outlook, and every grid that was judged, with its outlook."""
+    """A torus cut by its openness, and every grid that was judged, with its openness."""
     template = load_template("box-3x3x2")
     seen = {}
 
@@ -346,21 +346,21 @@ def judged():
     return template, found, seen
 
 
-def test_voxels_of_the_best_outlook_are_taken(judged):
+def test_voxels_of_the_least_openness_are_taken(judged):
     template, found, seen = judged
     assert len(found) == 2 < len(seen)
     bound = ClosingBound(template, "S")
-    outlook = []
+    openness = []
     for voxels in found:
         least = bound.open_faces(voxels.cells, features(voxels).depth)
         lost = voxels.lost_volume * voxels.energy["fill"] / (1 - voxels.lost_volume)
-        outlook.append(least + len(voxels) - voxels.energy["fill"] + 4 * lost)
+        openness.append(least + len(voxels) - voxels.energy["fill"] + 4 * lost)
     # They were judged by half as many samples along a cell, so a few hundredths of a face are off.
-    assert outlook[0] < outlook[1] + 0.5
+    assert openness[0] < openness[1] + 0.5
     fullest = voxelize(torus(), template, placements=6, shortlist=3, results=2)
     for voxels in fullest:
         least = bound.open_faces(voxels.cells, features(voxels).depth)
-        assert outlook[0] < least + len(voxels) - voxels.energy["fill"] + 0.5
+        assert openness[0] < least + len(voxels) - voxels.energy["fill"] + 0.5
 
 
 def test_what_is_judged_before_a_cut_is_what_the_cut_has():
@@ -401,11 +401,11 @@ def test_turning_grids_a_little_never_ends_worse():
             if not grid.fit.excess
         ]
         # As few open faces as possible, whatever else.
-        outlook = Outlook(ClosingBound(template, "S").open_faces)
-        better = grids_of_better_outlook(search, grids, outlook, 5)
-        assert better == sorted(better, key=outlook)
-        assert min(map(outlook, better)) < min(map(outlook, grids))
+        openness = Openness(ClosingBound(template, "S").open_faces)
+        better = grids_of_less_openness(search, grids, openness, 5)
+        assert better == sorted(better, key=openness)
+        assert min(map(openness, better)) < min(map(openness, grids))
         assert all(grid.fit.excess == 0 and grid.rotation >= 4 for grid in better)
         assert set(search.family) <= set(range(4))
-        searches.append([(grid.rotation, outlook(grid)) for grid in better])
+        searches.append([(grid.rotation, openness(grid)) for grid in better])
     assert searches[0] == searches[1]

@@ -161,26 +161,22 @@ class VoxelizationProblems:
         return Job(problem, LatticeFoldability(), Effort())
 
     def closing_order(self) -> list[int]:
-        """Voxelizations by how well the box is likely to be closed; with --protect by cuts.
+        """Voxelizations by how open the box is likely to stay; with --protect by cuts.
 
-        What counts is the number of faces that must stay open, and a face more for each cell's
-        worth of space among the voxels, see :mod:`fabfold.voxels.outlook`.
+        See :mod:`fabfold.voxels.openness`.
         """
         if self._closing is None:
             order = list(range(len(self.options)))
             if not self.wishes.regions:
-                order.sort(key=self._outlook)
+                order.sort(key=self._openness)
             self._closing = order
         return self._closing
 
-    def _outlook(self, option: int) -> float:
+    def _openness(self, option: int) -> float:
         """Faces that must stay open, and cells' worth of space among the voxels."""
+        least = (1.0 - self.at_most(option)) * visible_faces(self.template)
         fill = self.options[option].fill
-        return self._least_open(option) + len(fill) - float(fill.sum())
-
-    def _least_open(self, option: int) -> float:
-        """Faces of the box that must stay open."""
-        return (1.0 - self.at_most(option)) * visible_faces(self.template)
+        return least + len(fill) - float(fill.sum())
 
     def _size_ranks(self) -> list[int]:
         """For each voxelization the number of sizes that are fuller than its own."""
@@ -203,12 +199,12 @@ class VoxelizationProblems:
         Returns
         -------
         list of int
-            Those that were not tried count as if they came as near to their outlook as the best
+            Those that were not tried count as if they came as near to their openness as the best
             of the others. Those on which nothing folded come last, and with them what was not tried
             and is of their size, where a size that pays folds: room decides.
         """
         weight = weights_of(self.recipe).surface
-        floor = {option: weight * self._outlook(option) for option in range(len(self.options))}
+        floor = {option: weight * self._openness(option) for option in range(len(self.options))}
         gaps = [found[option] - floor[option] for option in found]
         gap = min(gaps, default=0.0)
         size = [len(voxels) for voxels in self.options]

@@ -16,7 +16,7 @@ from fabfold.solid.own_axes import own_axes
 from fabfold.solid.regions import Region
 from fabfold.voxels.grid_placement import RankedGrid, grid_rotations
 from fabfold.voxels.offsets import CellEnergy
-from fabfold.voxels.outlook import OpenFaces, Outlook, grids_of_better_outlook, two_of_a_family
+from fabfold.voxels.openness import OpenFaces, Openness, grids_of_less_openness, two_of_a_family
 from fabfold.voxels.refined_grid import RefinedGrid, unlike
 from fabfold.voxels.refinement import PITCHES, Refinement
 from fabfold.voxels.region_cells import region_cut_cost
@@ -34,14 +34,14 @@ _REFINED = 6
 _LARGER = ((22, 23), (24, 25), (26, 28), (30, 33), (36, 40))
 #: Placements of one size that are cut, until as many as wanted will do.
 _TRIES = 16
-#: Cells of all placements of one size together whose outlook is judged, of templates of up to 64
+#: Cells of all placements of one size together whose openness is judged, of templates of up to 64
 #: cells; of larger ones fewer, for a judgement takes the longer.
 _JUDGED_CELLS = 8192
 #: Templates of more cells are large: what folds in them mostly leaves much of them free.
 LARGE = 72
 #: Sizes that are worth a search where a template is not large: emptier ones close the box less.
 _PAYING = 2
-#: Grids of the best outlook whose rotations other sizes start from.
+#: Grids of the least openness whose rotations other sizes start from.
 _PASSED_ON = 10
 #: Voxelizations of different size that are looked for, and how much of a template the smallest
 #: leaves free: this, times the cube root of the number of its cells. Folding into a box that is
@@ -106,15 +106,15 @@ def voxelize(
         Parts of the model that shall lie in few cells; each cell more costs as much as a sliver.
     open_faces : callable, optional
         Takes the (n, 3) cells of voxels and their (n, 6) ray depths and says how many faces of the
-        box must stay open. Of the sizes that pay, those of the best outlook are taken then, see
-        :mod:`fabfold.voxels.outlook`, and not those of most fill. Not where there are `regions`.
+        box must stay open. Of the sizes that pay, those of the least openness are taken then, see
+        :mod:`fabfold.voxels.openness`, and not those of most fill. Not where there are `regions`.
     progress : Progress, optional
         Hears of the stages of the search.
 
     Returns
     -------
     list of Voxels
-        Different ones, best first: of best outlook, then those of most total fill, less 0.5 a
+        Different ones, best first: of least openness, then those of most total fill, less 0.5 a
         sliver, less lost material. The counts of both checkerboard colours fit the template, and
         the voxels hang together through printed contacts. Of four, three leave a part of the
         template free, each more than the one before, see :func:`fill_shares`; not where `pitch` or
@@ -162,7 +162,7 @@ def voxelize(
         ranked = [RankedGrid(0.0, 0, float(value), (x, y, z)) for value in pitches]
     turns = [item.rotation for item in ranked]
     shares = fill_shares(len(template))[:results] if free else (1.0,)
-    outlook = None if open_faces is None or regions else Outlook(open_faces)
+    openness = None if open_faces is None or regions else Openness(open_faces)
     paying = paying_sizes(len(template))
     # One of each size, and more of those that pay.
     counts = [1] * len(shares)
@@ -177,10 +177,10 @@ def voxelize(
             here = refinement.with_share(share)
             some = here.rank_again(turns, pitches * share ** (-1 / 3))
             some = some[: max(1, shortlist // _FEWER)]
-        judge = outlook if place in paying else None
+        judge = openness if place in paying else None
         found = _refined_grids(here, some, free, centre is not None, regions, judge is not None)
         if judge and free and rotation is None and place == 0:
-            better = grids_of_better_outlook(here, unlike(found, [], _judged(here)), judge, seed)
+            better = grids_of_less_openness(here, unlike(found, [], _judged(here)), judge, seed)
             found = sorted(found + better, key=lambda grid: grid.sort_key)
             # The other sizes start from these turns too.
             turns = [grid.rotation for grid in better[:_PASSED_ON]] + turns
@@ -349,9 +349,9 @@ def _different(found: list[RefinedGrid]) -> list[RefinedGrid]:
 
 @dataclass(frozen=True)
 class _CutGrid:
-    """A grid that was cut: its outlook and its price, the lower the better, and its voxels."""
+    """A grid that was cut: its openness and its price, the lower the better, and its voxels."""
 
-    outlook: float
+    openness: float
     price: float
     grid: RefinedGrid
     voxels: Voxels
@@ -359,11 +359,11 @@ class _CutGrid:
     @property
     def sort_key(self) -> tuple[float, float]:
         """Orders cuts, best first."""
-        return (self.outlook, self.price)
+        return (self.openness, self.price)
 
 
 def _judged(refinement: Refinement) -> int:
-    """How many grids of one size are judged by their outlook."""
+    """How many grids of one size are judged by their openness."""
     cells = refinement.capacity.cells
     return max(_TRIES, int(_JUDGED_CELLS * min(1.0, 64 / cells)) // cells)
 
@@ -375,16 +375,16 @@ def _finish(
     count: int,
     max_loss: float,
     regions: Sequence[Region],
-    outlook: Outlook | None,
+    openness: Openness | None,
 ) -> list[_CutGrid]:
     """Cut the best grids and check the voxels, until `count` will do.
 
     Grids that are taken are added to `chosen`; a grid like an earlier one is passed over.
     """
-    if outlook is None:
+    if openness is None:
         grids = unlike(found, chosen, len(found))
     else:
-        grids = sorted(unlike(found, chosen, _judged(refinement)), key=outlook)
+        grids = sorted(unlike(found, chosen, _judged(refinement)), key=openness)
     # Sampling the warped model can still cost a cell its place, so some more than are wanted.
     grids = two_of_a_family(refinement, grids)[:_TRIES]
     done: list[_CutGrid] = []
@@ -393,7 +393,7 @@ def _finish(
         if voxels is None or voxels.lost_volume > max_loss:
             continue
         price = region_cut_cost(regions, refinement.placement(grid)) - voxels.energy["score"]
-        judged = np.inf if outlook is None or grid.depth is None else outlook(grid)
+        judged = np.inf if openness is None or grid.depth is None else openness(grid)
         done.append(_CutGrid(judged, price, grid, voxels))
         chosen.append(grid)
         if len(done) == count:

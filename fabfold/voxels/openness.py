@@ -1,4 +1,4 @@
-"""How well a box of voxels is likely to be closed, said before they are cut, and grids with more.
+"""How open a box of voxels is likely to stay, said before they are cut, and grids of less.
 
 A box is closed by what its voxels have at their faces, and how near a search comes to that depends
 on how full the voxels are (Eq. 1 of the paper). The energy of trees goes up about as much with one
@@ -20,25 +20,25 @@ from numpy.typing import NDArray
 from fabfold.voxels.refined_grid import RefinedGrid, unlike
 from fabfold.voxels.refinement import Refinement
 
-__all__ = ["OpenFaces", "Outlook", "grids_of_better_outlook"]
+__all__ = ["OpenFaces", "Openness", "grids_of_less_openness", "two_of_a_family"]
 
 #: Takes the (n, 3) cells of voxels and their (n, 6) ray depths; faces of the box that stay open.
 OpenFaces = Callable[[NDArray[np.int32], NDArray[np.float64]], float]
-#: What a cell's worth of lost material counts in an outlook, in open faces: nothing shall be left
+#: What a cell's worth of lost material counts in an openness, in open faces: nothing shall be left
 #: out of a model just to close its box.
 _LOSS_PRICE = 4.0
-#: Digits of an outlook: more than these depend on rounding, and so on how the model lies.
+#: Digits of an openness: more than these depend on rounding, and so on how the model lies.
 _DIGITS = 2
-#: Grids of the best outlook that are turned a little, turns of all of them together, standard
+#: Grids of the least openness that are turned a little, turns of all of them together, standard
 #: deviation of a turn in degrees and its change from round to round, rounds.
 _TURNED, _TURNS, _SPREAD_DEG, _NARROWER, _ROUNDS = 4, 24, 3.0, 0.6, 3
 #: Grids that such a round goes on with.
 _POOL = 64
-#: An outlook that needs to be no better: not one face is open.
+#: An openness that needs to be no better: not one face is open.
 _CLOSED = 1.0
 
 
-class Outlook:
+class Openness:
     """Faces of the box that must stay open, and cells' worth of space among the voxels.
 
     Parameters
@@ -52,7 +52,7 @@ class Outlook:
         self._known: dict[int, tuple[RefinedGrid, float]] = {}
 
     def __call__(self, grid: RefinedGrid) -> float:
-        """Outlook of a grid that has ray depths, the lower the better."""
+        """Openness of a grid that has ray depths, the lower the better."""
         if id(grid) not in self._known:
             fit = grid.fit
             assert grid.depth is not None
@@ -62,10 +62,10 @@ class Outlook:
         return self._known[id(grid)][1]
 
 
-def grids_of_better_outlook(
-    refinement: Refinement, grids: Sequence[RefinedGrid], outlook: Outlook, seed: int
+def grids_of_less_openness(
+    refinement: Refinement, grids: Sequence[RefinedGrid], openness: Openness, seed: int
 ) -> list[RefinedGrid]:
-    """Turn the grids of the best outlook a little, again and again.
+    """Turn the grids of the least openness a little, again and again.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def grids_of_better_outlook(
         Their search.
     grids : sequence of RefinedGrid
         Grids that fit, with ray depths, unlike each other.
-    outlook : Outlook
+    openness : Openness
         What is looked for.
     seed : int
         Of the turns.
@@ -83,18 +83,18 @@ def grids_of_better_outlook(
     list of RefinedGrid
         Those that fit of all that were tried, best first.
     """
-    pool = sorted(grids, key=outlook)
+    pool = sorted(grids, key=openness)
     found: list[RefinedGrid] = []
     for number in range(_ROUNDS):
-        if not pool or outlook(pool[0]) < _CLOSED:
+        if not pool or openness(pool[0]) < _CLOSED:
             break
         best = two_of_a_family(refinement, pool)[:_TURNED]
         spread = _SPREAD_DEG * _NARROWER**number
         tried = refinement.refine_turned(best, _TURNS, seed + number, spread)
         fitting = [grid for grid in tried if grid.fit.excess == 0]
         found += fitting
-        pool = unlike(sorted([*pool, *fitting], key=outlook), [], _POOL)
-    return sorted(found, key=outlook)
+        pool = unlike(sorted([*pool, *fitting], key=openness), [], _POOL)
+    return sorted(found, key=openness)
 
 
 def two_of_a_family(refinement: Refinement, grids: Sequence[RefinedGrid]) -> list[RefinedGrid]:
