@@ -14,12 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfold.lattice.rotations import FACE_BEFORE, FACES, ROTATION_PRODUCT, ROTATIONS
+from fabfold.lattice.rotations import FACES, ROTATION_PRODUCT, ROTATIONS
 from fabfold.lattice.template import Template
 from fabfold.tree.catalogue import JointSet, joint_types
 from fabfold.tree.fold_tree import FoldTree
 from fabfold.tree.phases import phase_labels, phase_of, phase_rotations
 from fabfold.tree.problem import TreeProblem
+from fabfold.tree.tables import depth_by_pose
 
 __all__ = [
     "ClosingBound",
@@ -174,7 +175,7 @@ class ClosingBound:
 
     def __init__(self, template: Template, joints: JointSet) -> None:
         self._cells = template.cells
-        self._shown = _shown_faces(template).astype(np.float64)
+        self._shown = _shown_faces(template).astype(np.int64)
         self._labels = phase_labels(joint_types(joints))
         self._phases = _unlike_phases(self._labels, template)
 
@@ -194,11 +195,8 @@ class ClosingBound:
             0 where every face is closed, 1 more for each that is wholly open; infinite where no
             phase has room for the colours of the voxels.
         """
-        by_turn = depth[:, FACE_BEFORE]  # of each voxel, rotation and face of a cell
-        cost = np.zeros((len(source), len(self._cells), 24))
-        for face in range(6):
-            cost += by_turn[:, None, :, face] * self._shown[None, :, None, face]
-        empty = self._shown.sum(axis=1)
+        cost = depth_by_pose(depth, self._shown)
+        empty = self._shown.sum(axis=1).astype(np.float64)
         turns = phase_rotations(self._labels, source, self._cells)
         bounds = (_assigned(cost, empty, turns[phase]) for phase in self._phases)
         return min((bound.energy for bound in bounds if bound is not None), default=np.inf)

@@ -12,7 +12,7 @@ from fabfold.lattice.rotations import FACE_BEFORE, FACES, ROTATION_PRODUCT, ROTA
 from fabfold.lattice.template import Template
 from fabfold.tree.catalogue import Joint, realizations
 
-__all__ = ["Tables", "cost_table", "joint_table", "realization_table"]
+__all__ = ["Tables", "cost_table", "depth_by_pose", "joint_table", "realization_table"]
 
 
 class Tables(NamedTuple):
@@ -161,6 +161,26 @@ def realization_table(
     return start, np.array(found, dtype=np.int32).reshape(-1, 4)
 
 
+def depth_by_pose(depth: NDArray[np.float64], shown: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Sum of the ray depths behind the faces that the box shows, of each voxel at each pose.
+
+    Parameters
+    ----------
+    depth : (n, 6) float64 array
+        Mean ray depth into each voxel from each of its faces in A, 0 to 1 (Eq. 8).
+    shown : (m, 6) int array
+        1 where the filled shape shows a face of a cell, 0 elsewhere.
+
+    Returns
+    -------
+    (n, m, 24) float64 array
+        By voxel, cell and rotation.
+    """
+    # Face f of the cell in B is face FACE_BEFORE[r, f] of the voxel in A.
+    by_face = np.asarray(depth, dtype=float)[:, FACE_BEFORE]
+    return np.asarray(np.einsum("nrf,mf->nmr", by_face, shown))
+
+
 def cost_table(
     depth: NDArray[np.float64],
     exposed: NDArray[np.uint8],
@@ -188,9 +208,7 @@ def cost_table(
         As in :class:`Tables`.
     """
     bits = (exposed[:, None] >> np.arange(6)) & 1
-    # Face f of the cell in B is face FACE_BEFORE[r, f] of the voxel in A.
-    by_face = np.asarray(depth, dtype=float)[:, FACE_BEFORE]
-    cost = surface_weight * np.einsum("nrf,mf->nmr", by_face, bits)
+    cost = surface_weight * depth_by_pose(depth, bits)
     if extra_cost is not None:
         cost += np.asarray(extra_cost, dtype=float).reshape(cost.shape)
     by_cell = cost.mean(axis=2)

@@ -142,11 +142,8 @@ class Refinement:
         vertices = self.vertices @ self.rotations[rotation].T
         low, extent = vertices.min(axis=0), np.ptp(vertices, axis=0)
         side = max(side, float(np.cbrt(np.prod(extent) / _COARSE_LIMIT)), float(extent.max()) / 512)
-        return (
-            summed_volume((vertices - low) / side, self.faces, grid_shape(extent, side)),
-            side,
-            low,
-        )
+        table = summed_volume((vertices - low) / side, self.faces, grid_shape(extent, side))
+        return table, side, low
 
     def pitch_range(self) -> tuple[float, float]:
         """Smallest and largest pitch that can make sense.
