@@ -1,6 +1,7 @@
 """Whole kits of a small model: what a user gets, twice the same, stopped and gone on."""
 
 import json
+import multiprocessing
 import os
 import shutil
 import signal
@@ -139,9 +140,11 @@ def test_interrupt_leaves_what_is_done_and_goes_on(bar, bar_options, tmp_path):
 
 @pytest.mark.slow
 def test_the_voxels_may_not_outnumber_the_template(bar):
+    before = set(multiprocessing.active_children())
     kit = Kit.from_model(bar, template="box-1x1x1", pitch=10.0)
     with pytest.raises(NoSolutionError, match=r"voxels|cells"):
         kit.fit()
+    assert set(multiprocessing.active_children()) <= before, "workers that stood by have ended"
 
 
 def test_grid_placement_by_hand(bar):

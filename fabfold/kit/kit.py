@@ -8,6 +8,7 @@ With a folder, finished stages are kept there, and the same recipe goes on from 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import partial
 from itertools import chain, islice
@@ -153,10 +154,7 @@ class Kit(StageRunner):
         return self._cut().options
 
     def cut_solid(self) -> Solid:
-        """What the voxels are cut from: the model, thickened where it was too thin.
-
-        Its notes tell by how much.
-        """
+        """What the voxels are cut from: the model, thickened where too thin, as its notes tell."""
         cut = self._cut()
         return replace(cut.solid, notes=(*self.solid().notes, *cut.notes(self.recipe.voxel_mm)))
 
@@ -205,8 +203,8 @@ class Kit(StageRunner):
             return planned
 
         key = keys.fold_key(self.recipe, self._template, self._mark())
-        if not self._is_done("fold", key):
-            self.fit()  # Ahead of this stage, so that the search shows its own progress.
+        if not self._is_done("fold", key):  # The search shows its own progress, ahead of this.
+            self.fit()
         return self._stage("fold", key, make, save_planned, load_planned)
 
     def join(self) -> BuiltTree:
@@ -239,8 +237,8 @@ class Kit(StageRunner):
 
         def make(progress: Progress) -> list[Check]:
             checks = run_checks(built, mode, progress)
-            bad = [check for check in checks if not check.ok]
-            progress.update(1.0, f"{len(checks) - len(bad)} of {len(checks)} passed")
+            passed = sum(check.ok for check in checks)
+            progress.update(1.0, f"{passed} of {len(checks)} passed")
             return checks
 
         key = keys.check_key(self.recipe, self._template, mode, self._mark())
@@ -276,8 +274,8 @@ class Kit(StageRunner):
         from fabfold.kit.writing import write_kit
 
         mode = self.print_mode()
-        self._stand_by()
-        self.cut_solid()  # Before anything in the folder changes.
+        with self._stand_by():
+            self.cut_solid()  # Before anything in the folder changes.
         store.take()
         with recorded_export(store, target, self.recipe.name):
             if own and not self.recipe.pick:
@@ -361,25 +359,25 @@ class Kit(StageRunner):
         """Search of the kit's voxelizations for its recipe, or one with another preference."""
         from fabfold.search.rounds import Rounds
 
-        self._stand_by()
-        return Rounds(
-            recipe,
-            self._template,
-            self.voxelize(),
-            key=keys.voxels_key(self.recipe, self._template),
-            store=self._store,
-            workers=self.workers,
-            open_progress=self._open_progress,
-            scheduler=self.scheduler,
-            seconds=seconds,
-            wishes=self.wishes(),
-            shift=shift,
-            on_first=on_first,
-            on_better=self.on_better,
-            standby=self._standby,
-        )
+        with self._stand_by():
+            return Rounds(
+                recipe,
+                self._template,
+                self.voxelize(),
+                key=keys.voxels_key(self.recipe, self._template),
+                store=self._store,
+                workers=self.workers,
+                open_progress=self._open_progress,
+                scheduler=self.scheduler,
+                seconds=seconds,
+                wishes=self.wishes(),
+                shift=shift,
+                on_first=on_first,
+                on_better=self.on_better,
+                standby=self._standby,
+            )
 
-    def _stand_by(self) -> None:
+    def _stand_by(self) -> AbstractContextManager[object]:
         from fabfold.search.standby import SearchStandby
 
         # With one worker all happens in this process, and what is called is compiled.
@@ -387,6 +385,7 @@ class Kit(StageRunner):
             cut = self._is_done("voxelize", keys.voxels_key(self.recipe, self._template))
             self._standby = SearchStandby(self.workers, self.recipe.joints)
             self._standby.start(workers=not cut)
+        return nullcontext() if self._standby is None else self._standby
 
     def _mark(self) -> list[Any]:
         return [] if self.recipe.pick else self._rounds().mark()

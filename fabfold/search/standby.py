@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from types import TracebackType
+from typing import Self
 
 from fabfold.progress import Progress
 from fabfold.search.kernels import KernelCompiler
@@ -49,6 +51,19 @@ class SearchStandby:
         if not self._compiler.start() and workers and self._count > 1:
             self._pool = ProcessExecutor(self._count)
             self._pool.stand_by(self._joints)
+
+    def __enter__(self) -> Self:
+        """What is done in here comes before the search: if it fails, the workers end."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        at: TracebackType | None,
+    ) -> None:
+        if kind is not None and (pool := self.take()) is not None:
+            pool.close()
 
     def wait(self, progress: Progress) -> None:
         """Wait until the kernels are compiled, which `progress` is told."""
