@@ -85,6 +85,7 @@ def test_no_tree_closes_the_box_further_than_the_bound(bar, folded):
         assert closed == pytest.approx(1 - shown)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", JOINT_SETS)
 @pytest.mark.parametrize("name", ["box-2x2x2", "box-3x2x2", "box-4x2x1", "l-64"])
 def test_the_bound_of_cells_and_depths_is_that_of_the_problem(name, joints):

@@ -165,6 +165,7 @@ def test_nothing_folds_without_budget(dog):
         solve(dog, 0, Stubborn(), Effort(restarts=2))
 
 
+@pytest.mark.slow
 def test_what_folds_while_poses_settle_is_found(dog):
     # No budget after settling: whatever folds was asked about on the way.
     effort = replace(QUICK, starts=1, closure_tests=0, polish_each=0, polish_best=0)

@@ -346,6 +346,7 @@ def judged():
     return template, found, seen
 
 
+@pytest.mark.slow
 def test_voxels_of_the_least_openness_are_taken(judged):
     template, found, seen = judged
     assert len(found) == 2 < len(seen)
@@ -385,6 +386,7 @@ def test_what_is_judged_before_a_cut_is_what_the_cut_has():
     assert all(grid.depth is None for grid in search.refine(item, (20,), False))
 
 
+@pytest.mark.slow
 def test_turning_grids_a_little_never_ends_worse():
     template = load_template("box-3x3x2")
     solid = torus()

@@ -176,11 +176,10 @@ class ProcessExecutor:
                     continue  # It is gone; `wait` tells.
 
     def close(self) -> None:
-        """End all workers; those that run a seed at once."""
+        """End all workers at once: none has anything left that is wanted."""
         for worker in self._workers:
-            worker.connection.close()  # An idle worker ends by that.
-            if worker.seed is not None:
-                worker.process.terminate()
+            worker.connection.close()
+            worker.process.terminate()
         for worker in self._workers:
             _end(worker.process)
         self._workers.clear()
