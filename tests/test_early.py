@@ -1,15 +1,21 @@
-"""The first kit that folds, written while the search goes on."""
+"""The first kit that folds, written while the model is cut and the search goes on."""
 
+import io
 import json
+import pickle
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import trimesh
 from stage_listener import StageListener
 
-from fabfold.errors import NoFoldError
-from fabfold.kit.early import EarlyKit
+from fabfold.errors import CheckError, GeometryError, NoFoldError
+from fabfold.kit import early as early_module
+from fabfold.kit.early import EarlyKit, write_early
+from fabfold.kit.first_trees import first_trees
 from fabfold.progress import SilentListener
+from fabfold.tree.kinematics_check import check_tree
 
 
 class Listener(StageListener):
@@ -23,72 +29,148 @@ class Listener(StageListener):
 
 
 @pytest.fixture
-def found(bar_kit):
-    return next(bar_kit._rounds().found())[0]
+def begin(bar_kit, monkeypatch, tmp_path):
+    """Makes the early kit of the bar, for a print mode and a listener, as if kernels were there."""
+    stamp = tmp_path / "kernels.stamp"
+    stamp.touch()
+    monkeypatch.setattr(early_module, "kernel_stamp", lambda: stamp)
+    (tmp_path / "kit").mkdir()
+
+    def make(listener=None, mode=None):
+        return EarlyKit(
+            bar_kit.recipe,
+            bar_kit.template,
+            mode or bar_kit.print_mode(),
+            tmp_path / "kit",
+            lambda: (bar_kit.solid(), bar_kit.wishes()),
+            listener or SilentListener(),
+        )
+
+    return make
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Lists the files in the kit's folder."""
+    return lambda: sorted(path.name for path in (tmp_path / "kit").iterdir())
 
 
 @pytest.mark.slow
-def test_a_first_kit_has_bodies_and_the_proof(bar_kit, found, tmp_path):
+def test_a_first_kit_has_bodies_and_the_proof(bar_kit, begin, tmp_path):
     listener = Listener()
-    with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), listener) as early:
-        early.start(found)
-        early.start(found)
+    with begin(listener) as early:
+        early.start()
+        early.start()
+        early.write()
         early.wait()
-    _, candidate = found
-    tree = json.loads((tmp_path / "tree.json").read_text("utf-8"))
-    motion = json.loads((tmp_path / "motion.json").read_text("utf-8"))
-    assert len(tree["hinges"]) == len(candidate.tree.hinges)
+    kit = tmp_path / "kit"
+    tree = json.loads((kit / "tree.json").read_text("utf-8"))
+    motion = json.loads((kit / "motion.json").read_text("utf-8"))
     assert motion["certificate"]["min_gap_mm"] >= bar_kit.print_mode().profile.min_gap_mm
-    bodies = sorted((tmp_path / "bodies").glob("*.stl"))
-    assert len(bodies) == len(candidate.tree.bodies)
+    bodies = sorted((kit / "bodies").glob("*.stl"))
+    assert len(bodies) == len(tree["bodies"]) == len(tree["hinges"]) + 1
     assert all(trimesh.load(path).is_watertight for path in bodies)
-    assert (tmp_path / f"{bar_kit.recipe.name}.3mf").stat().st_size > 1000
-    assert f"{len(candidate.tree.hinges)} hinges" in listener.told["early"]
-
-
-def test_a_kit_that_is_there_is_left_alone(bar_kit, found, tmp_path):
-    (tmp_path / "report.json").write_text("{}", "utf-8")
-    with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), SilentListener()) as early:
-        early.start(found)
-    assert [path.name for path in tmp_path.iterdir()] == ["report.json"]
+    assert (kit / f"{bar_kit.recipe.name}.3mf").stat().st_size > 1000
+    assert f"{len(tree['hinges'])} hinges, box closed to" in listener.told["early"]
 
 
 @pytest.mark.slow
-def test_a_tree_whose_bodies_do_not_come_out_says_why_and_leaves_nothing(bar_kit, found, tmp_path):
+def test_the_first_trees_fold_and_come_with_few_hinges_first(bar_kit):
+    template = bar_kit.template
+    trees = list(first_trees(bar_kit.recipe, template, bar_kit.solid(), bar_kit.wishes()))
+    counts = [len(planned.tree.hinges) for planned in trees]
+    assert counts == sorted(counts)
+    cells = {tuple(cell) for cell in template.cells.tolist()}
+    for planned in trees:
+        assert check_tree(planned.tree) == []
+        assert {tuple(cell) for cell in planned.tree.target.tolist()} <= cells
+        assert len(planned.motion.moves) >= 2
+    again = first_trees(bar_kit.recipe, template, bar_kit.solid(), bar_kit.wishes())
+    assert np.array_equal(next(again).tree.target, trees[0].tree.target)
+
+
+@pytest.mark.parametrize("name", ["report.json", "tree.json"])
+def test_a_kit_that_is_there_is_left_alone(begin, files, tmp_path, name):
+    (tmp_path / "kit" / name).write_text("{}", "utf-8")
+    with begin() as early:
+        early.start()
+        early.write()
+        assert early._process is None
+    assert files() == [name]
+
+
+def test_nothing_is_made_where_it_is_not_wanted(begin, files):
+    with begin() as early:
+        early.start(wanted=False)
+        early.write()
+        assert early._process is None
+    assert files() == []
+
+
+def test_it_waits_for_the_kernels(begin, monkeypatch, tmp_path):
+    stamp = tmp_path / "later.stamp"
+    monkeypatch.setattr(early_module, "kernel_stamp", lambda: stamp)
+    with begin() as early:
+        early.start()
+        assert early._process is None
+        stamp.touch()
+        early.write()
+        assert early._process is not None
+
+
+@pytest.mark.slow
+def test_a_tree_whose_bodies_do_not_come_out_says_why_and_leaves_nothing(bar_kit, begin, files):
     listener = Listener()
     mode = bar_kit.print_mode()
     huge = replace(mode, profile=mode.profile.model_copy(update={"clearance_mm": 4.9}))
-    with EarlyKit(tmp_path, bar_kit.recipe, huge, listener) as early:
-        early.start(found)
+    with begin(listener, huge) as early:
+        early.start()
+        early.write()
         early.wait()
     assert "Error" in listener.told["early"]
-    assert list(tmp_path.iterdir()) == []
+    assert files() == []
 
 
-def test_its_process_waits_for_a_tree_and_ends_where_none_comes(bar_kit, tmp_path):
-    early = EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), SilentListener())
-    with pytest.raises(NoFoldError), early:
+def test_the_last_error_is_raised_where_no_tree_can_be_built(bar_kit, tmp_path, monkeypatch):
+    errors = iter([GeometryError("too thick"), CheckError("too near")])
+
+    def refuse(*_, **__):
+        raise next(errors)
+
+    monkeypatch.setattr(early_module, "build", refuse)
+    planned = object()
+    monkeypatch.setattr(early_module, "first_trees", lambda *_: iter([planned, planned]))
+    work = pickle.dumps((bar_kit.recipe, bar_kit.template, bar_kit.print_mode(), tmp_path, 0, 0))
+    with pytest.raises(CheckError, match="too near"):
+        write_early(io.BytesIO(work))
+    monkeypatch.setattr(early_module, "first_trees", lambda *_: iter([]))
+    with pytest.raises(NoFoldError):
+        write_early(io.BytesIO(work))
+
+
+def test_it_ends_where_the_model_cannot_be_cut(begin, files):
+    with pytest.raises(NoFoldError), begin() as early:
+        early.start()
         process = early._process
         assert process.poll() is None
         raise NoFoldError("nothing folds")
     assert process.poll() is not None
-    assert list(tmp_path.iterdir()) == []
+    assert files() == []
 
 
-def test_it_is_given_up_once_the_search_is_over(bar_kit, found, tmp_path):
+def test_it_is_given_up_once_the_search_is_over(begin, tmp_path):
     listener = Listener()
-    with EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), listener) as early:
-        early.start(found)
+    with begin(listener) as early:
+        early.start()
+        early.write()
     assert listener.told["early"] == "given up: the search is over"
     assert not list(tmp_path.rglob(".part-*"))
 
 
 @pytest.mark.slow
-def test_it_is_finished_where_the_search_was_stopped(bar_kit, found, tmp_path):
-    with (
-        pytest.raises(KeyboardInterrupt),
-        EarlyKit(tmp_path, bar_kit.recipe, bar_kit.print_mode(), SilentListener()) as early,
-    ):
-        early.start(found)
+def test_it_is_finished_where_the_search_was_stopped(bar_kit, begin, files):
+    with pytest.raises(KeyboardInterrupt), begin() as early:
+        early.start()
+        early.write()
         raise KeyboardInterrupt
-    assert (tmp_path / f"{bar_kit.recipe.name}.3mf").is_file()
+    assert f"{bar_kit.recipe.name}.3mf" in files()

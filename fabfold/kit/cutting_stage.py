@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from fabfold.kit.box_closure import open_faces
 from fabfold.lattice.rotations import rotation_of_degrees
@@ -13,9 +14,12 @@ from fabfold.solid.closed_solid import Solid
 from fabfold.solid.regions import Region
 from fabfold.voxels.thickening import Cut, cut_thick
 from fabfold.voxels.voxel_model import Voxels
-from fabfold.voxels.voxelize import voxelize
+from fabfold.voxels.voxelize import fill_shares, voxelize
 
 __all__ = ["cut_model"]
+
+#: What a hasty cut looks at: placements, and those of them whose planes are moved.
+_HASTY = {"placements": 24, "shortlist": 8}
 
 
 def cut_model(
@@ -24,6 +28,8 @@ def cut_model(
     template: Template,
     regions: Sequence[Region],
     progress: Progress,
+    *,
+    hasty: bool = False,
 ) -> Cut:
     """Cut a model into voxels, thickened as the recipe asks.
 
@@ -39,12 +45,19 @@ def cut_model(
         Parts of the model that shall lie in few cells.
     progress : Progress
         Hears of the stages of the search.
+    hasty : bool
+        Two voxelizations out of few placements in a second or two, a full and a roomy one, instead
+        of those that are worth a search.
 
     Raises
     ------
     NoVoxelsError
         If no placement of the grid fits.
     """
+    looks: dict[str, Any] = {"open_faces": open_faces(recipe, template)}
+    if hasty:
+        shares = fill_shares(len(template))
+        looks = {**_HASTY, "results": 2, "shares": (shares[0], *shares[1:][-1:])}
 
     def cut(model: Solid) -> list[Voxels]:
         return voxelize(
@@ -56,8 +69,8 @@ def cut_model(
             pitch=recipe.pitch,
             drop_below=recipe.drop_below,
             regions=regions,
-            open_faces=open_faces(recipe, template),
             progress=progress,
+            **looks,
         )
 
     if recipe.thicken == "off":

@@ -1,4 +1,4 @@
-"""The first kit that folds, on disk while the search still looks for better ones."""
+"""The first kit that folds, on disk while better trees are still looked for."""
 
 from __future__ import annotations
 
@@ -10,133 +10,195 @@ import threading
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from typing import BinaryIO
 
 from fabfold.child_process import end_with_parent, module_call
-from fabfold.fold.motion import motion_of
-from fabfold.kit.stages import PlannedTree, build
+from fabfold.errors import CheckError, GeometryError, NoFoldError
+from fabfold.kit.first_trees import first_trees
+from fabfold.kit.stages import BuiltTree, build
+from fabfold.lattice.template import Template
 from fabfold.printing.print_mode import PrintMode
-from fabfold.progress import Listener
+from fabfold.progress import Listener, SilentProgress
 from fabfold.recipe.recipe import Recipe
-from fabfold.search.rounds import Found
+from fabfold.search.kernels import kernel_stamp
+from fabfold.solid.closed_solid import Solid
 from fabfold.tree.bound import closed_share
+from fabfold.wishes.wish_list import Wishes
 
 __all__ = ["EarlyKit", "write_early"]
 
-#: What takes long to load, loaded while there is no tree yet.
+#: What takes long to load, loaded while the process waits for its model.
 _NEEDED = ("fabfold.kit.writing", "manifold3d", "pymeshlab")
+#: Trees whose bodies are tried.
+_TREES = 3
 
 
 class EarlyKit:
-    """Builds and writes a first tree beside the search, in a process of its own.
+    """Cuts a model in haste, takes a tree that folds and builds it, in a process of its own.
 
-    A thread only waits for it: MeshLab, which looks at the bodies, may not be used in a thread that
-    is not the first. What is written is what a printer needs and the proof that it folds:
-    ``tree.json``, ``motion.json`` with its certificate, the bodies and the 3MF. Everything is
-    replaced by the final kit, so it is given up where the search is over sooner. Where the tree
-    cannot be built, nothing is written.
+    It does so from the moment the model is read, beside cutting it well and searching; and it
+    writes once the search has begun, for then the kit folder is this run's. A thread only waits for
+    it: MeshLab, which looks at the bodies, may not be used in a thread that is not the first. What
+    is written is what a printer needs and the proof that it folds: ``tree.json``, ``motion.json``
+    with its certificate, the bodies and the 3MF. Everything is replaced by the final kit, so it is
+    given up where the search is over sooner. Where no tree can be built, nothing is written.
 
     Parameters
     ----------
-    folder : Path
-        Kit folder.
     recipe : Recipe
         Names the files and has the size of a voxel.
+    template : Template
+        The target shape, as it is filled.
     mode : PrintMode
         How the kit is printed.
+    folder : Path
+        Kit folder; nothing is made where it has a kit.
+    model : callable
+        Gives the model and the wishes, once they are needed.
     listener : Listener
         Shows that the kit is there.
     """
 
-    def __init__(self, folder: Path, recipe: Recipe, mode: PrintMode, listener: Listener) -> None:
-        self._folder, self._recipe, self._mode = folder, recipe, mode
-        self._listener = listener
+    def __init__(
+        self,
+        recipe: Recipe,
+        template: Template,
+        mode: PrintMode,
+        folder: Path,
+        model: Callable[[], tuple[Solid, Wishes]],
+        listener: Listener,
+    ) -> None:
+        self._job = recipe, template, mode, folder
+        self._model, self._listener = model, listener
+        there = (folder / name for name in ("tree.json", "report.json"))
+        self._wanted = not any(path.is_file() for path in there)
         self._thread: threading.Thread | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._over = False
 
-    def start(self, found: Found) -> None:
-        """Begin with a tree; only the first call counts, and only in a folder without a kit."""
-        if self._thread is not None or (self._folder / "report.json").is_file():
-            return
-        voxels, candidate = found
-        motion = motion_of(candidate.tree, candidate.path)
-        planned = PlannedTree(voxels, candidate.tree, motion)
-        # A daemon, so that Ctrl-C ends the run at once: each file is written whole or not at all.
-        self._thread = threading.Thread(target=self._make, args=(planned,), daemon=True)
-        self._thread.start()
-
     def __enter__(self) -> EarlyKit:
-        """Start the process, which loads what it needs before there is a tree."""
-        there = (self._folder / name for name in ("tree.json", "report.json"))
-        if not any(path.is_file() for path in there):
-            self._process = self._open()
+        """While it is open, the kit may be made."""
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Give up what the final kit replaces; where none will come, wait until it is written."""
-        if kind is None or self._thread is None:
-            self._over = True
-            if self._process is not None:
-                self._process.terminate()
-                if self._thread is None:
-                    self._process.communicate()
-        self.wait()
+    def start(self, *, wanted: bool = True) -> None:
+        """Begin, if it has not begun.
 
-    def _open(self) -> subprocess.Popen[bytes]:
+        Not before the search's kernels are compiled, for here they would be compiled once more.
+
+        Parameters
+        ----------
+        wanted : bool
+            False to make nothing, now or later.
+        """
+        self._wanted &= wanted
+        if not self._wanted or self._process is not None or not kernel_stamp().exists():
+            return
+        solid, wishes = self._model()
         command, environment = module_call("fabfold.kit.early")
-        return subprocess.Popen(
+        self._process = subprocess.Popen(
             command,
             env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
         )
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(pickle.dumps((*self._job, solid, wishes)))
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            return  # It ended; `write` says why.
+
+    def write(self) -> None:
+        """Let it write what it has made, or will have made, and say so."""
+        self.start()
+        if self._process is not None and self._thread is None:
+            # A daemon, so that Ctrl-C ends the run at once: each file is written whole or not at
+            # all.
+            self._thread = threading.Thread(target=self._follow, args=(self._process,), daemon=True)
+            self._thread.start()
+
+    def end(self) -> None:
+        """Give up what the final kit will replace."""
+        if self._process is not None and not self._over:
+            self._over = True
+            self._process.terminate()
+            if self._thread is None:
+                self._process.communicate()
+        self.wait()
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Where no better kit will come, wait until this one is written."""
+        if kind is None or self._thread is None:
+            self.end()
+        self.wait()
 
     def wait(self) -> None:
         """Wait until nothing is written any more."""
         if self._thread is not None:
             self._thread.join()
 
-    def _make(self, planned: PlannedTree) -> None:
-        work = pickle.dumps((planned, self._mode, self._recipe, self._folder))
+    def _follow(self, process: subprocess.Popen[bytes]) -> None:
         with self._listener.stage("early") as progress:
-            process = self._process = self._process or self._open()
-            if self._over:
-                process.terminate()
-            _, said = process.communicate(work)
-            hinges, closed = len(planned.tree.hinges), 100 * closed_share(planned.tree)
-            text = f"{hinges} hinges, box closed to {closed:.0f} %; better ones replace it"
-            if process.returncode and self._over:
+            # That its input ends tells it that it may write.
+            _, said = process.communicate()
+            last = "".join(said.decode(errors="replace").strip().splitlines()[-1:])
+            if process.returncode == 0:
+                text = f"{last}; better ones replace it"
+            elif self._over:
                 text = "given up: the search is over"
-            elif process.returncode:
-                # The search has other trees.
-                why = said.decode(errors="replace").strip().splitlines()[-1:]
-                text = f"not this one: {' '.join(why)}"
+            else:
+                text = f"not this time: {last}"  # The search has other trees.
             progress.update(1.0, text)
 
 
-def write_early(work: bytes, before_writing: Callable[[], object] = lambda: None) -> None:
-    """Build and write what :class:`EarlyKit` asks for.
+def write_early(source: BinaryIO, before_writing: Callable[[], object] = lambda: None) -> str:
+    """Find, build and write what :class:`EarlyKit` asks for.
 
     Parameters
     ----------
-    work : bytes
-        Pickle of the planned tree, the print mode, the recipe and the folder.
+    source : binary file
+        A pickle of the recipe, template, print mode, folder, solid and wishes. Where it ends, files
+        may be written.
     before_writing : callable, optional
-        Called once the bodies are made.
+        Called once the bodies are made and files may be written.
+
+    Returns
+    -------
+    str
+        What the kit is, in a few words.
 
     Raises
     ------
+    NoVoxelsError, NoTreeError, RecipeError
+        As :func:`first_trees` does.
+    NoFoldError
+        If no tree folds.
     GeometryError, CheckError
-        If the bodies do not come out.
+        If the bodies of none come out.
     """
     from fabfold.kit.writing import write_printable
-    from fabfold.progress import SilentProgress
 
-    planned, mode, recipe, folder = pickle.loads(work)
-    built = build(planned, mode, recipe.voxel_mm, (), SilentProgress(), orders=False)
+    recipe, template, mode, folder, solid, wishes = pickle.load(source)
+    built = _first_built(recipe, template, solid, wishes, mode)
+    source.read()
     before_writing()
     write_printable(folder, recipe, mode, built)
+    tree = built.planned.tree
+    return f"{len(tree.hinges)} hinges, box closed to {100 * closed_share(tree):.0f} %"
+
+
+def _first_built(
+    recipe: Recipe, template: Template, solid: Solid, wishes: Wishes, mode: PrintMode
+) -> BuiltTree:
+    trees = first_trees(recipe, template, solid, wishes)
+    why: GeometryError | CheckError | None = None
+    for planned, _ in zip(trees, range(_TREES), strict=False):
+        try:
+            return build(planned, mode, recipe.voxel_mm, (), SilentProgress(), orders=False)
+        except (GeometryError, CheckError) as error:
+            why = error
+    raise why or NoFoldError("nothing folds yet")
 
 
 if __name__ == "__main__":
@@ -145,4 +207,5 @@ if __name__ == "__main__":
     for name in _NEEDED:
         import_module(name)
     # Given up before it writes anything, or not at all: there are no half-written kits.
-    write_early(sys.stdin.buffer.read(), lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN))
+    said = write_early(sys.stdin.buffer, lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN))
+    sys.stderr.write(f"{said}\n")

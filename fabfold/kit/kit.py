@@ -237,8 +237,7 @@ class Kit(StageRunner):
 
         def make(progress: Progress) -> list[Check]:
             checks = run_checks(built, mode, progress)
-            passed = sum(check.ok for check in checks)
-            progress.update(1.0, f"{passed} of {len(checks)} passed")
+            progress.update(1.0, f"{sum(check.ok for check in checks)} of {len(checks)} passed")
             return checks
 
         key = keys.check_key(self.recipe, self._template, mode, self._mark())
@@ -261,37 +260,39 @@ class Kit(StageRunner):
         if target is None:
             raise KitError("where to? Give a folder to export to")
         require_free_folder(target)
-        own = target == self.folder
-        store = self._store if own else StageStore(target)
+        store = self._store if target == self.folder else StageStore(target)
         with store.locked():
-            self._export(target, store, own=own)
+            self._export(target, store)
         return target
 
-    def _export(self, target: Path, store: StageStore, *, own: bool) -> None:
+    def _export(self, target: Path, store: StageStore) -> None:
         from fabfold.kit.delivered import recorded_export
         from fabfold.kit.early import EarlyKit
         from fabfold.kit.step_process import StepProcess
         from fabfold.kit.writing import write_kit
 
         mode = self.print_mode()
-        with self._stand_by():
-            self.cut_solid()  # Before anything in the folder changes.
-        store.take()
-        with recorded_export(store, target, self.recipe.name):
-            if own and not self.recipe.pick:
-                with EarlyKit(target, self.recipe, mode, self.listener) as self._early:
-                    self.fold()
-            built = self.join()
-            path = target / f"{self.recipe.name}.step"
-            with StepProcess(path, built, beside=self.workers != 1) as step:
-                checks = self.check()
-                with self._open_progress("export") as progress:
-                    write_kit(
-                        target, self.recipe, mode, self.cut_solid(), built, checks, progress,
-                        step.wait, self.wish_report(built.planned, built.joinery), self._template,
-                        self.box_closure(built.planned),
-                    )  # fmt: skip
-        if not own:
+        files = self.recipe, self._template, mode, target
+        self._early = EarlyKit(*files, lambda: (self.solid(), self.wishes()), self.listener)
+        with self._early as early:
+            with self._stand_by():
+                early.start(wanted=store is self._store and not self.recipe.pick)
+                self.cut_solid()  # Before anything in the folder changes.
+            store.take()
+            with recorded_export(store, target, self.recipe.name):
+                self.fold()
+                early.end()
+                built = self.join()
+                path = target / f"{self.recipe.name}.step"
+                with StepProcess(path, built, beside=self.workers != 1) as step:
+                    checks = self.check()
+                    with self._open_progress("export") as progress:
+                        write_kit(
+                            target, self.recipe, mode, self.cut_solid(), built, checks, progress,
+                            step.wait, self.wish_report(built.planned, built.joinery),
+                            self._template, self.box_closure(built.planned),
+                        )  # fmt: skip
+        if store is not self._store:
             self._keep_inputs(store)
 
     def run(self, stage: str) -> None:
@@ -345,8 +346,8 @@ class Kit(StageRunner):
                 store.keep(file, digest, name)
 
     def _rounds(self) -> Rounds:
-        first = None if self._early is None else self._early.start
-        make = partial(self._rounds_of, self.recipe, seconds=self.seconds, on_first=first)
+        begin = None if self._early is None else self._early.write
+        make = partial(self._rounds_of, self.recipe, seconds=self.seconds, on_begin=begin)
         return self._once("rounds", make)
 
     def _rounds_of(
@@ -354,7 +355,7 @@ class Kit(StageRunner):
         recipe: Recipe,
         shift: int = 0,
         seconds: float | None = None,
-        on_first: Callable[[Found], None] | None = None,
+        on_begin: Callable[[], None] | None = None,
     ) -> Rounds:
         """Search of the kit's voxelizations for its recipe, or one with another preference."""
         from fabfold.search.rounds import Rounds
@@ -372,7 +373,7 @@ class Kit(StageRunner):
                 seconds=seconds,
                 wishes=self.wishes(),
                 shift=shift,
-                on_first=on_first,
+                on_begin=on_begin,
                 on_better=self.on_better,
                 standby=self._standby,
             )

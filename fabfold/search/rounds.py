@@ -66,8 +66,8 @@ class Rounds:
         Of the recipe.
     shift : int
         Added to the number of each seed, for searches that run beside one another.
-    on_first : callable, optional
-        Told of the first tree that folds, with its voxels, as soon as its rung is done.
+    on_begin : callable, optional
+        Called once a search begins, its kernels compiled; nothing is left of earlier runs then.
     on_better : callable, optional
         Told of each tree that is better than all before, with its voxels, as soon as it is known.
     standby : SearchStandby, optional
@@ -88,7 +88,7 @@ class Rounds:
         seconds: float | None = None,
         wishes: Wishes | None = None,
         shift: int = 0,
-        on_first: Callable[[Found], None] | None = None,
+        on_begin: Callable[[], None] | None = None,
         on_better: Callable[[Found], None] | None = None,
         standby: SearchStandby | None = None,
     ) -> None:
@@ -103,7 +103,7 @@ class Rounds:
         self._key = key
         self._cache = SeedCache(store)
         self._open_progress = open_progress
-        self._on_first = on_first
+        self._on_begin = on_begin
         self._on_better = on_better
         self._standby = standby
         self._option_of: dict[int, int] = {}
@@ -253,9 +253,11 @@ class Rounds:
         return results
 
     def wait_for_kernels(self, progress: Progress) -> None:
-        """Wait until the kernels are compiled."""
+        """Wait until the kernels are compiled; the search begins."""
         if self._standby is not None:
             self._standby.wait(progress)
+        if self._on_begin is not None:
+            self._on_begin()
 
     def executor(self, seeds: int, over: Callable[[], bool]) -> AbstractContextManager[Executor]:
         """What runs the seeds: workers that stood by, or :func:`fabfold.search.run.executor`."""
@@ -326,9 +328,6 @@ class Rounds:
             todo = ((task.seed, self._work(task)) for task in tasks if task.seed not in done)
             run_seeds(pool, todo, on_event, budget.over)
             results |= found
-            if place == 0 and self._on_first is not None:
-                for pair in self._paired(results)[:1]:
-                    self._on_first(pair)
             if budget.over() or rung.is_last(before, _best(results)):
                 break
         return results

@@ -66,6 +66,7 @@ def voxelize(
     placements: int = 160,
     shortlist: int = 64,
     results: int = 8,
+    shares: Sequence[float] | None = None,
     drop_below: float = 0.04,
     max_offset: int = 4,
     max_loss: float = MAX_LOSS,
@@ -96,6 +97,9 @@ def voxelize(
         Placements whose planes are moved.
     results : int
         Most voxelizations to return.
+    shares : sequence of float, optional
+        Shares of the template's cells that they shall fill, 1 first; by default those of
+        :func:`fill_shares`, as many as there are results.
     drop_below : float
         Cells with less material than this share are dropped.
     max_offset : int
@@ -161,7 +165,7 @@ def voxelize(
         x, y, z = centre.tolist()
         ranked = [RankedGrid(0.0, 0, float(value), (x, y, z)) for value in pitches]
     turns = [item.rotation for item in ranked]
-    shares = fill_shares(len(template))[:results] if free else (1.0,)
+    shares = (shares or fill_shares(len(template)))[:results] if free else (1.0,)
     openness = None if open_faces is None or regions else Openness(open_faces)
     paying = paying_sizes(len(template))
     # One of each size, and more of those that pay.
