@@ -1,10 +1,10 @@
 """How good the trees are and how long they take: writes benchmarks/energies.md and its plot.
 
-    python benchmarks/energies.py [NAME ...] [--effort normal] [--seed 1] [--joints S]
+    python benchmarks/energies.py [NAME ...] [--effort normal] [--seed 1] [--joints auto]
 
 Each model is voxelized and searched (``fabfold fit``) in a fresh process with one worker, the
-paper's weights and warm kernels; by single hinges, or the `--joints` asked for, which are printed
-and not kept. Seconds are processor seconds of that process.
+paper's weights and warm kernels; by the default joints, or the `--joints` asked for, which are
+printed and not kept. Seconds are processor seconds of that process.
 Beside them stand the figures of before the search was changed (``energies_before.json``): one
 ``fabfold fit`` with one worker for each model, start of the program included. Results are kept in
 ``energies.json``; models that are named are measured again. Models of the paper and of others are
@@ -113,7 +113,8 @@ def table(rows: dict[str, dict[str, Any]], before: dict[str, dict[str, Any]]) ->
     lines = [
         "# Trees: how good, and how long they take",
         "",
-        "Written by `python benchmarks/energies.py`; single hinges, one worker, processor seconds.",
+        "Written by `python benchmarks/energies.py`; the default joints (single hinges, and double",
+        "ones where they pay; *hinges* counts the axes), one worker, processor seconds.",
         "*closed* is the share to which the box is closed, *at most* what these voxels would allow",
         "whatever the joints. *Before* is the search of 0.1 at its default effort, `fabfold fit`",
         "once a model with one worker (`energies_before.json`); its seconds include cutting and",
@@ -256,7 +257,7 @@ def main() -> int:
     parser.add_argument("names", nargs="*")
     parser.add_argument("--effort", default="normal")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--joints", default="S")
+    parser.add_argument("--joints", default="auto")
     parser.add_argument("--models", type=Path, default=SHARED)
     parser.add_argument("--one", nargs=2, metavar=("SOURCE", "TEMPLATE"), help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -285,7 +286,7 @@ def main() -> int:
         if done.returncode:
             print(f"{key}: {done.stderr[-500:]}", file=sys.stderr)
             continue
-        if options.joints != "S":
+        if options.joints != "auto":
             print(f"{key}, {options.joints}: {done.stdout.strip()}", flush=True)
             continue
         # Another run may have written meanwhile.

@@ -100,9 +100,9 @@ def test_every_fault_of_a_recipe_is_told_with_its_line(tmp_path):
         assert words in told, told
 
 
-@pytest.mark.parametrize("given", ["s", "S", "s+d", "S+D", "ALL", "s90"])
+@pytest.mark.parametrize("given", ["s", "S", "s+d", "S+D", "ALL", "s90", "Auto"])
 def test_joints_are_read_in_any_case(given):
     recipe = make_recipe(model="a.stl", template="box-1x1x2", joints=given)
-    assert recipe.joints in ("S", "S90", "S+D", "all")
-    with pytest.raises(RecipeError, match="'S', 'S90', 'S\\+D' or 'all'"):
+    assert recipe.joints in ("auto", "S", "S90", "S+D", "all")
+    with pytest.raises(RecipeError, match="'auto', 'S', 'S90', 'S\\+D' or 'all'"):
         make_recipe(model="a.stl", template="box-1x1x2", joints="hinge")

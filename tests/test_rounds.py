@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -186,4 +187,53 @@ def test_fewer_seeds_search_a_large_template_at_normal_effort():
         assert usual[0] == large[0]  # the guarantee
         if fewer:
             assert sum(rung.seeds for rung in large) < sum(rung.seeds for rung in usual) / 2
-            assert {rung.effort for rung in large} <= {rung.effort for rung in usual}
+            # As long as the others, but for fewer kicks at the end.
+            kicks = [sum(rung.effort.kicks for rung in rungs) for rungs in (large, usual)]
+            assert kicks[0] < kicks[1]
+            few, many = ({replace(r.effort, kicks=0) for r in rungs} for rungs in (large, usual))
+            assert few <= many
+
+
+@pytest.mark.parametrize("effort", ["quick", "normal", "thorough"])
+def test_further_joints_come_in_with_the_best_trees_and_kicks_follow(effort):
+    rungs = schedule(effort, 0)
+    best = [rung.takes == "best" for rung in rungs]
+    assert [rung.every_joint for rung in rungs] == best == sorted(best)
+    first, second, *_ = (rung for rung in rungs if rung.takes == "best")
+    assert first.effort.kicks == 0
+    assert second.effort.kicks > 0
+    # The first is no end, also where it gains nothing; the second is.
+    assert not first.is_last(5.0, 5.0)
+    assert second.is_last(5.0, 5.0)
+    assert not second.is_last(5.0, 4.9)
+
+
+@pytest.mark.slow
+def test_double_hinges_are_let_in_where_they_pay(tmp_path):
+    """A model whose box closes further with them; the search itself is that of single hinges."""
+    import trimesh
+
+    path = tmp_path / "ball.stl"
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    ball.apply_scale((30.0, 26.0, 22.0))
+    ball.export(path)
+    options = {"template": "box-3x3x3", "effort": "quick", "seed": 1, "workers": 1}
+    kits = {
+        joints: Kit.from_model(path, folder=tmp_path / joints, joints=joints, **options)
+        for joints in ("S", "auto")
+    }
+    single, auto = (kit.fit()[0] for kit in kits.values())
+    assert single.tree.joints["D"] == 0
+    assert auto.tree.joints["D"] > 0
+    assert auto.energy["total"] < single.energy["total"]
+    seeds = [set(kit._rounds()._held(0)) for kit in kits.values()]
+    assert seeds[0] == seeds[1]
+    held = [kit._rounds()._held(0) for kit in kits.values()]
+    first = min(held[0])
+    for seed in range(first, first + 5):  # the rungs before the best trees
+        assert [c.tree.joints for c in held[0][seed].candidates] == [
+            c.tree.joints for c in held[1][seed].candidates
+        ]
+    # What singles found is taken as it is, when the joints change.
+    again = Kit.from_model(path, folder=tmp_path / "S", joints="auto", **options)
+    assert again.fit()[0].energy == auto.energy

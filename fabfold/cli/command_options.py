@@ -336,8 +336,8 @@ Joints = Annotated[
     str | None,
     typer.Option(
         "--joints",
-        help="Hinges to search with: S (single, the default), S+D (double ones too), S90 or all "
-        "(quarter turns too).",
+        help="Hinges to search with: S (single), S+D (double ones too), auto (double ones where "
+        "they pay, the default), S90 or all (quarter turns too).",
     ),
 ]
 DoubleWeight = Annotated[

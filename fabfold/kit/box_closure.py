@@ -64,7 +64,7 @@ def open_faces(
     """
     if recipe.share:
         return lambda cells, depth: 0.0
-    return ClosingBound(template, recipe.joints).open_faces
+    return ClosingBound(template, recipe.first_joints).open_faces
 
 
 def closing_rate(recipe: Recipe, template: Template) -> Callable[[Voxels], float]:
@@ -91,7 +91,7 @@ def closing_rate(recipe: Recipe, template: Template) -> Callable[[Voxels], float
                 features(voxels),
                 template,
                 weights_of(recipe),
-                joints=recipe.joints,
+                joints=recipe.every_joint,
                 share=recipe.share,
             )
         except NoTreeError:

@@ -21,8 +21,8 @@ from fabfold.wishes.wish_list import Wishes
 
 __all__ = ["first_trees"]
 
-#: Seeds of each voxelization that are run until a tree folds.
-_SEEDS = 4
+#: Seeds that are run until a tree folds, from the roomiest voxelization on, which folds soonest.
+_SEEDS = (3, 1)
 
 
 def first_trees(
@@ -55,9 +55,8 @@ def first_trees(
     cut = cut_model(recipe, solid, template, wishes.regions, SilentProgress(), hasty=True)
     problems = VoxelizationProblems(recipe, template, cut.options, wishes)
     effort = schedule(recipe.effort, 0)[0].effort
-    # The roomiest first, which folds soonest.
-    for number in range(_SEEDS * len(problems.options)):
-        option = number // _SEEDS
+    turns = zip(range(len(problems.options)), _SEEDS, strict=False)
+    for number, option in enumerate(option for option, seeds in turns for _ in range(seeds)):
         job = problems.job(option, number)
         if isinstance(job, SeedResult):
             continue

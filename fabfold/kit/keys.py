@@ -30,7 +30,7 @@ def voxels_key(recipe: Recipe, template: Template) -> str:
         recipe.seed,
         [recipe.rotation, recipe.origin, recipe.pitch, recipe.drop_below],
         ["thicken", "off" if recipe.thicken == "off" else recipe.thickness],
-        ["closing", recipe.joints, recipe.share, recipe.surface_weight > 0],
+        ["closing", recipe.first_joints, recipe.share, recipe.surface_weight > 0],
         *([list(recipe.protect)] if recipe.protect else []),
     )
 

@@ -384,7 +384,7 @@ class Kit(StageRunner):
         # With one worker all happens in this process, and what is called is compiled.
         if self._standby is None and self.workers != 1 and self.scheduler is None:
             cut = self._is_done("voxelize", keys.voxels_key(self.recipe, self._template))
-            self._standby = SearchStandby(self.workers, self.recipe.joints)
+            self._standby = SearchStandby(self.workers, self.recipe.first_joints)
             self._standby.start(workers=not cut)
         return nullcontext() if self._standby is None else self._standby
 

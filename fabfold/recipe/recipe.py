@@ -19,7 +19,7 @@ from fabfold.errors import FabfoldError, RecipeError
 from fabfold.lattice.shipped import load_template
 from fabfold.recipe.targets import is_file_name
 from fabfold.toml_files import TomlError, faults_of, read_toml
-from fabfold.tree.catalogue import JointSet
+from fabfold.tree.catalogue import JointChoice, JointSet
 from fabfold.version import __version__
 
 __all__ = ["Recipe", "make_recipe", "read_recipe"]
@@ -148,9 +148,12 @@ class Recipe(BaseModel):
         tuple[str, ...], Field(description="regions of the model that no cut may cross")
     ] = ()
     joints: Annotated[
-        JointSet,
-        Field(description="hinges: S single, S+D double ones too, S90 and all: quarter turns too"),
-    ] = "S"
+        JointChoice,
+        Field(
+            description="hinges: S single, S+D double ones too, auto double ones where they pay, "
+            "S90 and all: quarter turns too"
+        ),
+    ] = "auto"
     double_weight: Annotated[float, Field(ge=0, le=100, description="weight of a double hinge")] = (
         0.12
     )
@@ -171,6 +174,16 @@ class Recipe(BaseModel):
     pick: Annotated[
         int, Field(ge=0, le=1000, description="solution of the Pareto list; 0 is the best tree")
     ] = 0
+
+    @property
+    def first_joints(self) -> JointSet:
+        """Joints that trees are searched with."""
+        return "S" if self.joints == "auto" else self.joints
+
+    @property
+    def every_joint(self) -> JointSet:
+        """Joints that the best trees may be changed with: all that a kit can have."""
+        return "S+D" if self.joints == "auto" else self.joints
 
     @field_validator("*", mode="before")
     @classmethod
@@ -200,7 +213,7 @@ class Recipe(BaseModel):
     @field_validator("joints", mode="before")
     @classmethod
     def _joints_in_any_case(cls, value: Any) -> Any:
-        known = {name.lower(): name for name in get_args(JointSet)}
+        known = {name.lower(): name for name in get_args(JointChoice)}
         return known.get(value.lower(), value) if isinstance(value, str) else value
 
     @field_validator("prefer", mode="before")

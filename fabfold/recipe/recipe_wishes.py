@@ -8,6 +8,7 @@ from fabfold.errors import RecipeError
 from fabfold.recipe.recipe import Recipe, make_recipe
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.regions import parse_keep, parse_region, sample_region, sample_surface
+from fabfold.tree.catalogue import JointChoice
 from fabfold.tree.problem import Weights
 from fabfold.wishes.keep import Keep
 from fabfold.wishes.wish_list import Wishes
@@ -65,13 +66,21 @@ def make_wishes(recipe: Recipe, solid: Solid) -> Wishes:
     )
 
 
-def wished(recipe: Recipe) -> list[Any]:
-    """All of a recipe that its wishes come from (JSON-ready); empty where there is none."""
+def wished(recipe: Recipe, joints: JointChoice | None = None) -> list[Any]:
+    """All of a recipe that its wishes come from (JSON-ready); empty where there is none.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        The recipe.
+    joints : str, optional
+        Joints in place of the recipe's.
+    """
     fields = {
         "keep": list(recipe.keep),
         "keep_weight": recipe.keep_weight if recipe.keep else 0.0,
         "protect": list(recipe.protect),
-        "joints": recipe.joints,
+        "joints": joints or recipe.joints,
         "double_weight": recipe.double_weight,
         "joints_inside": recipe.joints_inside,
         "void": recipe.void,

@@ -150,11 +150,11 @@ def compile_half(half: str) -> None:
     if half == "tree":
         _search_without_folding()
     else:
-        _fold_a_strip()
+        _fold_strips()
 
 
-def _fold_a_strip() -> None:
-    """Test, plan and shorten the folding of a strip of four cells, zigzag."""
+def _fold_strips() -> None:
+    """Test, plan and shorten the folding of a strip of four cells and of two on a link plate."""
     from fabfold.fold.lattice_foldability import LatticeFoldability
     from fabfold.tree.system import HingeSystem
 
@@ -166,10 +166,19 @@ def _fold_a_strip() -> None:
         axis=np.array([1, 1, 1], np.int8),
         turns=np.array([-2, 2, -2], np.int8),
     )
+    linked = HingeSystem(
+        cells=np.array([(0, 0, 0), (1, 0, 0)], np.int32),
+        body=np.array([0, 2], np.int32),
+        parent=np.arange(2, dtype=np.int32),
+        point2=np.array([(1, 0, 1), (1, 1, 0)], np.int32),
+        axis=np.array([1, 2], np.int8),
+        turns=np.array([-2, 2], np.int8),
+    )
     judge = LatticeFoldability()
-    judge.stuck_hinges(strip)
-    found = judge.estimate(strip, 40)
-    judge.path(strip, found.guide)
+    for system in (strip, linked):
+        judge.stuck_hinges(system)
+        found = judge.estimate(system, 40)
+        judge.path(system, found.guide)
 
 
 def _search_without_folding() -> None:

@@ -24,7 +24,6 @@ from fabfold.search.voxelization_problems import VoxelizationProblems
 from fabfold.store import StageStore, stage_key
 from fabfold.tree.bound import closed_share
 from fabfold.tree.candidate import Candidate
-from fabfold.tree.effort import Effort
 from fabfold.voxels.voxel_model import Voxels
 from fabfold.voxels.voxelize import LARGE
 from fabfold.wishes.wish_list import Wishes
@@ -242,7 +241,7 @@ class Rounds:
             tally = Tally(progress, {}, lambda _done: budget.share, describe=self.describe)
             with self.executor(rounds, budget.over) as pool:
                 progress.update(None, "getting ready")
-                warm_up(pool, self.recipe.joints)
+                warm_up(pool, self.recipe.first_joints)
                 budget.restart()
                 for number in range(rounds):
                     results |= self._search_round(number, pool, tally, budget)
@@ -371,7 +370,7 @@ class Rounds:
         seeds = range(first, first + rung.seeds)
         if rung.takes == "best":
             return [
-                self._task(number, seed, self._option_of[start.seed], rung.effort, start)
+                self._task(number, seed, self._option_of[start.seed], rung, start)
                 for seed, start in zip(seeds, self._starts(results), strict=False)
             ]
         order = list(range(len(self.problems.options)))
@@ -381,8 +380,7 @@ class Rounds:
             order = self.problems.promising_order(self._best_by_option(results))
         order = order[: rung.options]
         return [
-            self._task(number, seed, order[k % len(order)], rung.effort)
-            for k, seed in enumerate(seeds)
+            self._task(number, seed, order[k % len(order)], rung) for k, seed in enumerate(seeds)
         ]
 
     def _best_by_option(self, results: Mapping[int, SeedResult]) -> dict[int, float]:
@@ -411,21 +409,23 @@ class Rounds:
         number: int,
         seed: int,
         option: int,
-        effort: Effort,
+        rung: Rung,
         start: Candidate | None = None,
     ) -> SeedTask:
-        recipe = self.recipe
+        recipe, effort = self.recipe, rung.effort
+        joints = recipe.every_joint if rung.every_joint else recipe.first_joints
         self._option_of[seed] = option
         about: list[Any] = [recipe.surface_weight, recipe.single_weight, self._carves(number)]
-        about += [*wished(recipe), repr(effort), option]
+        about += [*wished(recipe, joints), repr(effort), option]
         if start is not None:
             self._origin[seed] = start.seed
             about += [start.tree.to_json(1.0, (0.0, 0.0, 0.0)), start.path.tolist()]
-        return SeedTask(seed, stage_key(self._key, *about, seed), option, number, effort, start)
+        key = stage_key(self._key, *about, seed)
+        return SeedTask(seed, key, option, number, effort, joints, start)
 
     def _work(self, task: SeedTask) -> Job | SeedResult:
         """What a seed searches, or its result where its voxelization rules every tree out."""
-        job = self.problems.job(task.option, task.seed)
+        job = self.problems.job(task.option, task.seed, task.joints)
         if isinstance(job, SeedResult):
             return job
         if self._carves(task.number):

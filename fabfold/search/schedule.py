@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from fabfold.tree.candidate import Candidate
+from fabfold.tree.catalogue import JointSet
 from fabfold.tree.effort import EFFORTS, Effort
 
 __all__ = ["SEEDS_PER_ROUND", "Rung", "SeedTask", "schedule"]
@@ -39,16 +40,23 @@ class Rung:
         How long each may try.
     options : int
         Voxelizations that the seeds share.
+    every_joint : bool
+        Whether all joints of the recipe are used, or those that it searches with.
     """
 
     takes: Literal["roomy", "closing", "promising", "best"]
     seeds: int
     effort: Effort
     options: int = 1
+    every_joint: bool = False
 
     def is_last(self, before: float, after: float) -> bool:
-        """Whether no rung follows, by the least energy before this one and after it."""
-        return self.takes == "best" and after > before - GAIN
+        """Whether no rung follows, by the least energy before this one and after it.
+
+        One without kicks only begins: it lets further joints in, and kicks may find what it has
+        not.
+        """
+        return self.takes == "best" and self.effort.kicks > 0 and after > before - GAIN
 
 
 def _rungs(
@@ -73,21 +81,24 @@ def _rungs(
         Rung("roomy", 1, first),
         Rung("closing", closing[0], search, closing[1]),
         *(Rung("promising", seeds, search, options) for seeds, options in promising),
-        *(Rung("best", seeds, replace(effort, kicks=kicks)) for seeds, kicks in best),
+        *(
+            Rung("best", seeds, replace(effort, kicks=kicks), every_joint=True)
+            for seeds, kicks in best
+        ),
     )
 
 
 _SCHEDULES: dict[str, tuple[Rung, ...]] = {
-    "quick": _rungs(EFFORTS["quick"], (2, 2), ((2, 1),), ((1, 4),)),
-    "normal": _rungs(EFFORTS["normal"], (3, 3), ((4, 2), (4, 1)), ((2, 4), (2, 4))),
+    "quick": _rungs(EFFORTS["quick"], (2, 2), ((2, 1),), ((1, 0), (1, 2))),
+    "normal": _rungs(EFFORTS["normal"], (3, 3), ((4, 2), (4, 1)), ((2, 0), (2, 4))),
     # On large templates a seed takes ten times as long, and few of them fold: what more of them
     # find does not pay.
-    "normal, large": _rungs(EFFORTS["normal"], (2, 2), ((2, 1),), ((1, 4),)),
+    "normal, large": _rungs(EFFORTS["normal"], (2, 2), ((2, 1),), ((1, 0), (1, 2))),
     "thorough": _rungs(
         EFFORTS["thorough"],
         (12, 6),
         ((12, 3), (12, 2)),
-        ((6, 20), (4, 40), (4, 40), (4, 40)),
+        ((6, 0), (6, 20), (4, 20), (4, 20), (4, 20)),
     ),
 }
 
@@ -119,11 +130,12 @@ def schedule(effort: str, number: int, *, large: bool = False) -> tuple[Rung, ..
 
 @dataclass(frozen=True)
 class SeedTask:
-    """One seed: its number, digest, voxelization, round, effort, and the tree to go on from."""
+    """One seed: number, digest, voxelization, round, effort, joints, and a tree to go on from."""
 
     seed: int
     key: str
     option: int
     number: int
     effort: Effort
+    joints: JointSet
     start: Candidate | None

@@ -11,6 +11,7 @@ from fabfold.recipe.recipe import Recipe
 from fabfold.recipe.recipe_wishes import weights_of
 from fabfold.search.seeds import Job, SeedResult
 from fabfold.tree.bound import closed_at_most, visible_faces
+from fabfold.tree.catalogue import JointSet
 from fabfold.tree.effort import Effort
 from fabfold.tree.problem import from_features
 from fabfold.tree.template_parts import restrict_to_parts
@@ -118,11 +119,11 @@ class VoxelizationProblems:
     ) -> None:
         self.recipe, self.template, self.wishes = recipe, template, wishes
         self.options = usable(options, template, wishes)
-        self._jobs: dict[int, Job | SeedResult] = {}
-        self._at_most: dict[int, float] = {}
+        self._jobs: dict[tuple[int, JointSet], Job | SeedResult] = {}
+        self._at_most: dict[tuple[int, JointSet], float] = {}
         self._closing: list[int] | None = None
 
-    def job(self, option: int, seed: int) -> Job | SeedResult:
+    def job(self, option: int, seed: int, joints: JointSet | None = None) -> Job | SeedResult:
         """The problem of a voxelization, or the result where it rules every tree out.
 
         Parameters
@@ -131,31 +132,34 @@ class VoxelizationProblems:
             Number of the voxelization.
         seed : int
             Decides the faces of the parts, where the template folds once more.
+        joints : str, optional
+            Joint types; by default those that the recipe searches with.
         """
+        joints = joints or self.recipe.first_joints
         if self.template.creases:
-            return self._job_of(option, seed)  # the faces of the parts depend on the seed
-        if option not in self._jobs:
-            self._jobs[option] = self._job_of(option, seed)
-        return self._jobs[option]
+            return self._job_of(option, seed, joints)  # the faces of the parts depend on the seed
+        if (option, joints) not in self._jobs:
+            self._jobs[option, joints] = self._job_of(option, seed, joints)
+        return self._jobs[option, joints]
 
-    def _job_of(self, option: int, seed: int) -> Job | SeedResult:
+    def _job_of(self, option: int, seed: int, joints: JointSet) -> Job | SeedResult:
         voxels = self.options[option]
-        joints = features(voxels)
-        protected = self.wishes.protected(voxels, joints, self.template)
+        found = features(voxels)
+        protected = self.wishes.protected(voxels, found, self.template)
         try:
             problem = from_features(
                 voxels,
-                joints,
+                found,
                 self.template,
                 weights_of(self.recipe),
                 extra_cost=self.wishes.extra_cost(voxels, self.template),
-                always_rigid=rigid_pairs(protected, joints),
-                joints=self.recipe.joints,
+                always_rigid=rigid_pairs(protected, found),
+                joints=joints,
                 share=self.recipe.share,
             )
             problem = self.wishes.with_roots(problem, voxels, self.template)
             if self.template.creases:
-                problem = restrict_to_parts(problem, seed, joints.depth)
+                problem = restrict_to_parts(problem, seed, found.depth)
         except NoTreeError as error:
             return SeedResult((), fits=False, why=str(error))
         return Job(problem, LatticeFoldability(), Effort())
@@ -174,7 +178,8 @@ class VoxelizationProblems:
 
     def _openness(self, option: int) -> float:
         """Faces that must stay open, and cells' worth of space among the voxels."""
-        least = (1.0 - self.at_most(option)) * visible_faces(self.template)
+        closed = self._bound(option, self.recipe.first_joints)
+        least = (1.0 - closed) * visible_faces(self.template)
         fill = self.options[option].fill
         return least + len(fill) - float(fill.sum())
 
@@ -223,8 +228,11 @@ class VoxelizationProblems:
 
     def at_most(self, option: int) -> float:
         """Share to which the box could be closed with a voxelization; 0 where no tree fits."""
-        if option not in self._at_most:
-            job = self.job(option, self.recipe.seed)
+        return self._bound(option, self.recipe.every_joint)
+
+    def _bound(self, option: int, joints: JointSet) -> float:
+        if (option, joints) not in self._at_most:
+            job = self.job(option, self.recipe.seed, joints)
             closed = closed_at_most(job.problem) if isinstance(job, Job) else 0.0
-            self._at_most[option] = closed
-        return self._at_most[option]
+            self._at_most[option, joints] = closed
+        return self._at_most[option, joints]

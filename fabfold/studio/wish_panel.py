@@ -12,7 +12,7 @@ from fabfold.errors import RecipeError
 from fabfold.recipe.recipe import Recipe
 from fabfold.solid.regions import parse_region
 from fabfold.studio.grid_panel import ModelView
-from fabfold.tree.catalogue import JointSet
+from fabfold.tree.catalogue import JointChoice
 
 if TYPE_CHECKING:
     import viser
@@ -61,7 +61,9 @@ class WishPanel:
         self._keep = gui.add_text(
             "keep, WHAT:SIDE", "", hint="Such as front:front, or painted:top."
         )
-        self._joints = gui.add_dropdown("joints", tuple(get_args(JointSet)), initial_value="S")
+        self._joints = gui.add_dropdown(
+            "joints", tuple(get_args(JointChoice)), initial_value="auto"
+        )
         self._prefer = gui.add_slider("fewest hinges … best surface", 0.0, 1.0, 0.05, 0.5)
         self._void = gui.add_slider("empty space outside … inside", -1.0, 1.0, 0.1, 0.0)
         self._share = gui.add_checkbox("two voxels may share a cell", False)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -20,6 +21,7 @@ from fabfold.lattice.rotations import FACES, rotation_about, rotation_index
 __all__ = [
     "JOINT_SETS",
     "Joint",
+    "JointChoice",
     "JointSet",
     "double_joints",
     "edge_sides",
@@ -34,6 +36,9 @@ JointSet = Literal["S", "S90", "S+D", "all"]
 #: Joints that a search may use beside rigid ones: half-turn hinges; quarter turns as well; half
 #: turns and the double hinges that keep the checkerboard colour of a cell; everything.
 JOINT_SETS: tuple[JointSet, ...] = ("S", "S90", "S+D", "all")
+#: What may be asked for: one of the sets, or ``auto``, which searches with the first set and lets
+#: double hinges in where they make the best trees better.
+JointChoice = Literal["auto", "S", "S90", "S+D", "all"]
 
 
 @dataclass(frozen=True)
@@ -216,19 +221,21 @@ def realizations(joint: Joint) -> tuple[tuple[int, int, int, int], ...]:
         return ()
     if joint.kind == "S":
         return ((joint.sides[0], joint.turns[0], -1, 0),)
-    found = [
-        (first, q1, second, q2)
-        for first in range(4)
-        for second in range(4)
-        for q1 in (1, 2, 3)
-        for q2 in (1, 2, 3)
-        if first != second
-        and _landing(
-            joint.face, edge_turn(joint.face, first, q1) @ edge_turn(joint.face, second, q2)
-        )
-        == (joint.offset, joint.rotation)
-    ]
+    found = _two_axes(joint.face).get((joint.offset, joint.rotation), [])
     return tuple(sorted(found, key=lambda row: (row[1] + row[3], row)))
+
+
+@cache
+def _two_axes(
+    face: int,
+) -> dict[tuple[tuple[int, int, int], int], list[tuple[int, int, int, int]]]:
+    """Sides and turns of every two axes on different edges of a face, by where they take a cell."""
+    found: dict[tuple[tuple[int, int, int], int], list[tuple[int, int, int, int]]] = {}
+    for first, second, q1, q2 in product(range(4), range(4), (1, 2, 3), (1, 2, 3)):
+        if first != second:
+            transform = edge_turn(face, first, q1) @ edge_turn(face, second, q2)
+            found.setdefault(_landing(face, transform), []).append((first, q1, second, q2))
+    return found
 
 
 @cache
