@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO
@@ -73,6 +74,7 @@ class EarlyKit:
         there = (folder / name for name in ("tree.json", "report.json"))
         self._wanted = not any(path.is_file() for path in there)
         self._thread: threading.Thread | None = None
+        self._sender: threading.Thread | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._over = False
 
@@ -102,19 +104,23 @@ class EarlyKit:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
         )
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(pickle.dumps((*self._job, solid, wishes)))
-            self._process.stdin.flush()
-        except BrokenPipeError:
-            return  # It ended; `write` says why.
+        # Its modules are loaded before it reads, which nobody shall wait for.
+        work = pickle.dumps((*self._job, solid, wishes))
+        self._sender = threading.Thread(target=self._send, args=(self._process, work), daemon=True)
+        self._sender.start()
+
+    @staticmethod
+    def _send(process: subprocess.Popen[bytes], work: bytes) -> None:
+        assert process.stdin is not None
+        with suppress(BrokenPipeError):  # It ended; `write` says why.
+            process.stdin.write(work)
+            process.stdin.flush()
 
     def write(self) -> None:
         """Let it write what it has made, or will have made, and say so."""
         self.start()
         if self._process is not None and self._thread is None:
-            # A daemon, so that Ctrl-C ends the run at once: each file is written whole or not at
-            # all.
+            # A daemon, so that Ctrl-C ends the run at once: each file is written whole or not.
             self._thread = threading.Thread(target=self._follow, args=(self._process,), daemon=True)
             self._thread.start()
 
@@ -123,6 +129,8 @@ class EarlyKit:
         if self._process is not None and not self._over:
             self._over = True
             self._process.terminate()
+            if self._sender is not None:
+                self._sender.join()
             if self._thread is None:
                 self._process.communicate()
         self.wait()
@@ -140,6 +148,8 @@ class EarlyKit:
 
     def _follow(self, process: subprocess.Popen[bytes]) -> None:
         with self._listener.stage("early") as progress:
+            if self._sender is not None:
+                self._sender.join()
             # That its input ends tells it that it may write.
             _, said = process.communicate()
             last = "".join(said.decode(errors="replace").strip().splitlines()[-1:])
@@ -148,7 +158,8 @@ class EarlyKit:
             elif self._over:
                 text = "given up: the search is over"
             else:
-                text = f"not this time: {last}"  # The search has other trees.
+                # The search has other trees.
+                text = f"not this time: {last.partition('Error: ')[2] or last}"
             progress.update(1.0, text)
 
 
