@@ -61,12 +61,12 @@ def first_trees(
         if isinstance(job, SeedResult):
             continue
         found = run_seed(replace(job, effort=effort), number, lambda _: None, lambda: False)
-        for candidate in sorted(found.candidates, key=_size):
-            folded = add_crease_hinges(candidate, template)
-            if folded is not None:
-                motion = motion_of(folded.tree, folded.path)
-                yield PlannedTree(problems.options[option], folded.tree, motion)
-        if found.candidates:
+        folded = (add_crease_hinges(tree, template) for tree in found.candidates)
+        trees = sorted((tree for tree in folded if tree is not None), key=_size)
+        for candidate in trees:
+            motion = motion_of(candidate.tree, candidate.path)
+            yield PlannedTree(problems.options[option], candidate.tree, motion)
+        if trees:
             return
 
 
