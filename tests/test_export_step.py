@@ -117,7 +117,7 @@ def test_a_body_that_the_kernel_refuses_is_written_flat(tmp_path, monkeypatch):
 
     monkeypatch.setattr(step, "_measured", strict)
     facts = write_step(tmp_path / "row.step", joinery, tree)
-    assert len(refused) == 3  # thinned, the same without slivers, and not thinned
+    assert len(refused) == 4  # thinned, the same simplified and without slivers, and not thinned
     assert facts.plain == ("body-01",)
     solids = _read(tmp_path / "row.step").solids()
     assert all(_valid(solid) for solid in solids)
@@ -130,7 +130,7 @@ def test_a_body_that_the_kernel_refuses_is_written_flat(tmp_path, monkeypatch):
 def test_triangles_alone_make_a_valid_solid(tmp_path, monkeypatch):
     from fabfold.export import step
 
-    monkeypatch.setattr(step, "_LEVELS", (("triangles", 0.0),))
+    monkeypatch.setattr(step, "_LEVELS", (("triangles", 0.0, False),))
     ball = m3.Manifold.sphere(10, 24) - m3.Manifold.cube((10, 10, 10))
     write_step(tmp_path / "ball.step", _joinery(ball))
     (solid,) = _read(tmp_path / "ball.step").solids()
@@ -151,7 +151,7 @@ def test_a_face_that_crosses_itself_by_less_than_a_thousandth_is_mended(tmp_path
         faces += [(b, a, count), (a + up, b + up, count + up), (a, b, b + up), (a, b + up, a + up)]
     body = BodyMesh("body-00", vertices, np.array(faces, dtype=np.int32))
     wanted = mesh_volume(body.vertices, body.faces)
-    crossing = step._brep(body, [], "flat", 0.0, 2e-5)
+    crossing = step._brep(*without_needles(vertices, body.faces, 2e-5), [], "flat", 0.0)
     assert not step._measured(step_text([StepSolid("a", crossing, (0, 0, 0))], "a", "b"))[0]
     joinery = _joinery(m3.Manifold.cube((1, 1, 1)))
     object.__setattr__(joinery, "bodies", (body,))
@@ -161,6 +161,30 @@ def test_a_face_that_crosses_itself_by_less_than_a_thousandth_is_mended(tmp_path
     assert solid.volume == pytest.approx(wanted, rel=1e-4)
     assert facts.plain == ()
     assert len(solid.faces()) < len(faces)
+
+
+def test_a_triangle_whose_corners_lie_on_one_line_is_taken_away(tmp_path):
+    from fabfold.export import step
+
+    vertices, faces = _mesh(m3.Manifold.cube((10, 20, 30)))
+    # One face of an edge meets it in its middle, the other does not: a triangle of no area is left.
+    a, b = faces[0, 0], faces[0, 1]
+    middle, corner = len(vertices), faces[0, 2]
+    vertices = np.vstack([vertices, (vertices[a] + vertices[b]) / 2])
+    split = [(a, middle, corner), (middle, b, corner), (a, b, middle)]
+    faces = np.vstack([faces[1:], np.array(split, faces.dtype)])
+    body = BodyMesh("body-00", vertices, faces.astype(np.int32))
+    assert mesh_volume(vertices, body.faces) == pytest.approx(6000.0)
+    as_it_is = step._brep(vertices, body.faces, [], "triangles", 0.0)
+    assert not step._measured(step_text([StepSolid("a", as_it_is, (0, 0, 0))], "a", "b"))[0]
+    joinery = _joinery(m3.Manifold.cube((1, 1, 1)))
+    object.__setattr__(joinery, "bodies", (body,))
+    facts = write_step(tmp_path / "box.step", joinery)
+    (solid,) = _read(tmp_path / "box.step").solids()
+    assert _valid(solid)
+    assert solid.volume == pytest.approx(6000.0)
+    assert facts.plain == ()
+    assert len(solid.faces()) == 6
 
 
 def test_a_mesh_that_is_no_solid_is_named(tmp_path):

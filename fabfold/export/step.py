@@ -34,6 +34,7 @@ from fabfold.files import write_text
 from fabfold.joinery.bodies import BodyMesh, Joinery
 from fabfold.meshes import mesh_volume
 from fabfold.progress import Progress, SilentProgress
+from fabfold.solid.convert import to_manifold, to_mesh
 from fabfold.tree.fold_tree import FoldTree
 
 __all__ = ["StepFacts", "write_step"]
@@ -45,14 +46,16 @@ VOLUME_SHARE = 0.01
 _SHORTEST_MM, _SHORT_MM = 2e-5, 2e-3
 #: Sculpted surfaces may be thinned to within this share of the voxel side.
 THIN_SHARE = 0.003
-#: What is tried in turn, with the shortest edge that stays: slivers may cross themselves, thinned
-#: surfaces too, and round faces may be refused.
+#: What is tried in turn: the faces, the shortest edge that stays, and whether the mesh is
+#: simplified so far as well, which takes triangles away whose corners lie on one line. Slivers may
+#: cross themselves, thinned surfaces too, and round faces may be refused.
 _LEVELS = (
-    ("round, thinned", _SHORTEST_MM),
-    ("round, thinned", _SHORT_MM),
-    ("round", _SHORT_MM),
-    ("flat", _SHORT_MM),
-    ("triangles", _SHORTEST_MM),
+    ("round, thinned", _SHORTEST_MM, False),
+    ("round, thinned", _SHORTEST_MM, True),
+    ("round, thinned", _SHORT_MM, True),
+    ("round", _SHORT_MM, True),
+    ("flat", _SHORT_MM, True),
+    ("triangles", _SHORTEST_MM, True),
 )
 
 
@@ -205,13 +208,17 @@ def _sound_brep(
     """The best faces whose solid is valid and has the mesh's volume."""
     wanted = mesh_volume(body.vertices, body.faces)
     faults = []
-    for level, shortest_mm in _LEVELS:
+    for level, shortest_mm, simplify in _LEVELS:
         try:
-            brep = _brep(body, axes, level, thin_mm, shortest_mm)
+            mesh = (body.vertices, body.faces)
+            if simplify:
+                points, triangles = to_mesh(to_manifold(*mesh).simplify(shortest_mm))
+                mesh = (points, triangles.astype(np.int32))
+            brep = _brep(*without_needles(*mesh, shortest_mm), axes, level, thin_mm)
             valid, volume = _measured(
                 step_text([StepSolid(body.name, brep, (0, 0, 0))], body.name, application)
             )
-        except (ValueError, IndexError) as error:
+        except (ValueError, IndexError, GeometryError) as error:
             faults.append(f"{level}: {error}")
             continue
         if valid and abs(volume - wanted) <= VOLUME_SHARE * wanted:
@@ -223,8 +230,13 @@ def _sound_brep(
     )
 
 
-def _brep(body: BodyMesh, axes: list[Axis], level: str, thin_mm: float, shortest_mm: float) -> Brep:
-    vertices, faces = without_needles(body.vertices, body.faces, shortest_mm)
+def _brep(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    axes: list[Axis],
+    level: str,
+    thin_mm: float,
+) -> Brep:
     if level == "triangles":
         points, faces = weld_rounded(vertices, faces)
         vertices = points.astype(np.float64)
