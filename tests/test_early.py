@@ -12,10 +12,13 @@ from stage_listener import StageListener
 
 from fabfold.errors import CheckError, GeometryError, NoFoldError
 from fabfold.kit import early as early_module
+from fabfold.kit.cutting_stage import cut_model
 from fabfold.kit.early import EarlyKit, write_early
 from fabfold.kit.first_trees import first_trees
-from fabfold.progress import SilentListener
+from fabfold.kit.kit import Kit
+from fabfold.progress import SilentListener, SilentProgress
 from fabfold.tree.kinematics_check import check_tree
+from fabfold.voxels.voxelize import MAX_LOSS, fill_shares
 
 
 class Listener(StageListener):
@@ -87,6 +90,18 @@ def test_the_first_trees_fold_and_come_with_few_hinges_first(bar_kit):
         assert len(planned.motion.moves) >= 2
     again = first_trees(bar_kit.recipe, template, bar_kit.solid(), bar_kit.wishes())
     assert np.array_equal(next(again).tree.target, trees[0].tree.target)
+
+
+@pytest.mark.slow
+def test_a_cut_in_haste_is_full_and_roomy(tmp_path):
+    path = tmp_path / "ball.stl"
+    trimesh.creation.icosphere(subdivisions=3, radius=20.0).export(path)
+    kit = Kit.from_model(path, template="box-3x3x3", workers=1)
+    cut = cut_model(kit.recipe, kit.solid(), kit.template, (), SilentProgress(), hasty=True)
+    full, roomy = sorted((len(voxels) for voxels in cut.options), reverse=True)
+    assert roomy < full <= 27
+    assert roomy / 27 == pytest.approx(fill_shares(27)[-1], abs=0.08)
+    assert all(voxels.lost_volume <= MAX_LOSS for voxels in cut.options)
 
 
 @pytest.mark.parametrize("name", ["report.json", "tree.json"])

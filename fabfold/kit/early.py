@@ -118,6 +118,8 @@ class EarlyKit:
 
     def write(self) -> None:
         """Let it write what it has made, or will have made, and say so."""
+        if self._over:
+            return
         self.start()
         if self._process is not None and self._thread is None:
             # A daemon, so that Ctrl-C ends the run at once: each file is written whole or not.
