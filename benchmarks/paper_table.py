@@ -100,7 +100,6 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
     for name, row in rows.items():
         paper = MODELS.get(name, ("", "", None, None))[2]
         joints = f" ({paper})" if paper else ""
-        made = row.get("summary", {}).get("joints")
         if "summary" not in row:
             lines.append(
                 f"| {name} | {row['template']} | | {joints} | | | | | | | | | {row['exit']} |"
@@ -108,7 +107,7 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
             )
             continue
         s = row["summary"]
-        e = s["energy"]
+        e, made = s["energy"], s["joints"]
         lines.append(
             f"| {name} | {row['template']} | {s['voxels']} | {made['S']} + {made['D']}{joints} |"
             f" {e['surface']:.2f} | {e['count']:.2f} | {e['total']:.2f} |"

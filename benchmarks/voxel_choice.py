@@ -51,10 +51,10 @@ REASONS = (
 
 
 def kit_of(name: str, models: Path) -> Kit:
-    """The kit of a named model, nothing made yet."""
+    """The kit of a named model, nothing made yet; single hinges, which trees are searched with."""
     source, template = MODELS[name]
     path = source if source.startswith("sample:") else str(models / source)
-    return Kit.from_model(path, template=template, workers=1)
+    return Kit.from_model(path, template=template, joints="S", workers=1)
 
 
 def known(voxels: Any, kit: Kit) -> dict[str, float]:

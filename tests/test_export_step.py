@@ -31,7 +31,10 @@ def _mesh(solid: m3.Manifold) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _joinery(*solids: m3.Manifold) -> Joinery:
-    bodies = tuple(BodyMesh(f"body-{i:02d}", *_mesh(s)) for i, s in enumerate(solids))
+    return _joinery_of(*(BodyMesh(f"body-{i:02d}", *_mesh(s)) for i, s in enumerate(solids)))
+
+
+def _joinery_of(*bodies: BodyMesh) -> Joinery:
     return Joinery(bodies, 20.0, (0.0, 0.0, 0.0), 0.3, 2.5, 1.5, 3)
 
 
@@ -153,9 +156,7 @@ def test_a_face_that_crosses_itself_by_less_than_a_thousandth_is_mended(tmp_path
     wanted = mesh_volume(body.vertices, body.faces)
     crossing = step._brep(*without_needles(vertices, body.faces, 2e-5), [], "flat", 0.0)
     assert not step._measured(step_text([StepSolid("a", crossing, (0, 0, 0))], "a", "b"))[0]
-    joinery = _joinery(m3.Manifold.cube((1, 1, 1)))
-    object.__setattr__(joinery, "bodies", (body,))
-    facts = write_step(tmp_path / "mended.step", joinery)
+    facts = write_step(tmp_path / "mended.step", _joinery_of(body))
     (solid,) = _read(tmp_path / "mended.step").solids()
     assert _valid(solid)
     assert solid.volume == pytest.approx(wanted, rel=1e-4)
@@ -177,9 +178,7 @@ def test_a_triangle_whose_corners_lie_on_one_line_is_taken_away(tmp_path):
     assert mesh_volume(vertices, body.faces) == pytest.approx(6000.0)
     as_it_is = step._brep(vertices, body.faces, [], "triangles", 0.0)
     assert not step._measured(step_text([StepSolid("a", as_it_is, (0, 0, 0))], "a", "b"))[0]
-    joinery = _joinery(m3.Manifold.cube((1, 1, 1)))
-    object.__setattr__(joinery, "bodies", (body,))
-    facts = write_step(tmp_path / "box.step", joinery)
+    facts = write_step(tmp_path / "box.step", _joinery_of(body))
     (solid,) = _read(tmp_path / "box.step").solids()
     assert _valid(solid)
     assert solid.volume == pytest.approx(6000.0)
@@ -189,11 +188,9 @@ def test_a_triangle_whose_corners_lie_on_one_line_is_taken_away(tmp_path):
 
 def test_a_mesh_that_is_no_solid_is_named(tmp_path):
     vertices, faces = _mesh(m3.Manifold.cube((1, 1, 1)))
-    joinery = _joinery(m3.Manifold.cube((1, 1, 1)))
     inside_out = BodyMesh("body-03", vertices, np.ascontiguousarray(faces[:, ::-1]))
-    object.__setattr__(joinery, "bodies", (inside_out,))
     with pytest.raises(GeometryError, match="body-03"):
-        write_step(tmp_path / "x.step", joinery)
+        write_step(tmp_path / "x.step", _joinery_of(inside_out))
     assert not (tmp_path / "x.step").exists()
 
 

@@ -66,7 +66,7 @@ class Rounds:
     shift : int
         Added to the number of each seed, for searches that run beside one another.
     on_begin : callable, optional
-        Called once a search begins, its kernels compiled; nothing is left of earlier runs then.
+        Called whenever a search begins, its kernels compiled.
     on_better : callable, optional
         Told of each tree that is better than all before, with its voxels, as soon as it is known.
     standby : SearchStandby, optional
