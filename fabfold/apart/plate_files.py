@@ -71,7 +71,7 @@ def write_plates(
         write_3mf(
             folder / f"plate-{index + 1}.3mf",
             bodies,
-            thumbnail=thumbnail([(b.vertices, b.faces) for b in bodies.bodies], colours[on]),
+            thumbnail=thumbnail(bodies.drawn, colours[on]),
             title=f"{name}, plate {index + 1} of {plates.count}",
             metadata=metadata,
             colours=colours[on],
@@ -79,7 +79,7 @@ def write_plates(
             keep_place=True,
         )
     spread = _side_by_side(joinery, plates)
-    picture = thumbnail([(b.vertices, b.faces) for b in spread.bodies], colours)
+    picture = thumbnail(spread.drawn, colours)
     names = [body.name for body in joinery.bodies]
     write_3mf(
         folder / f"{name}.3mf",

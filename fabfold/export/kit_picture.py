@@ -74,7 +74,7 @@ def picture_of_kit(
     """
     angles = np.zeros(len(tree.hinges)) if angles_deg is None else angles_deg
     return render(
-        [(body.vertices, body.faces) for body in joinery.bodies],
+        joinery.drawn,
         body_colours(tree) if colours is None else colours,
         _poses_mm(joinery, tree, angles, upright),
         view,
@@ -181,9 +181,9 @@ def strip(
     states = [(motion.angles_deg[0], upright), (motion.angles_deg[-1], stand)]
     if between:
         states.insert(1, (halfway(motion), stand))
-    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
     clouds = [
-        posed_points(meshes, _poses_mm(joinery, tree, angles, turn)) for angles, turn in states
+        posed_points(joinery.drawn, _poses_mm(joinery, tree, angles, turn))
+        for angles, turn in states
     ]
     distance = max(_reach(cloud, view) for cloud in clouds)
     pictures = []

@@ -68,6 +68,7 @@ def render(
     distance: float | None = None,
     within: NDArray[np.float64] | None = None,
     smooth: Sequence[NDArray[np.float64]] | None = None,
+    only: tuple[int, int, int, int] | None = None,
 ) -> Image:
     """Draw meshes.
 
@@ -89,6 +90,8 @@ def render(
     smooth : sequence of (f, 3, 3) float64 array, optional
         What :func:`~fabfold.export.shading.corner_normals` gives for each mesh, for those who draw
         many pictures.
+    only : (int, int, int, int), optional
+        Left, top, right and bottom pixel of what is drawn; the rest of the picture stays empty.
 
     Returns
     -------
@@ -110,8 +113,11 @@ def render(
     pixels = (view.size[0] * samples, view.size[1] * samples)
     held = vertices if within is None else np.concatenate([vertices, within])
     camera = camera_for(held, view, pixels, distance)
-    screen = project(vertices, camera)
-    near, triangle = fill_triangles(screen, corners, *pixels)
+    left, top, right, bottom = only or (0, 0, *view.size)
+    screen = project(vertices, camera) - np.array([left * samples, top * samples, 0.0])
+    near, triangle = fill_triangles(
+        screen, corners, (right - left) * samples, (bottom - top) * samples
+    )
     # What is drawn sample by sample is the model; around it there is a page, or a floor.
     window, framed = _window(triangle, samples)
     first = np.array([[window[1].start, window[0].start, 0.0]])
@@ -126,6 +132,7 @@ def render(
     width, height = view.size
     sheet = np.empty((height, width, 3), dtype=np.float32)
     sheet[:] = linear_light(view.background)
+    page = sheet[top:bottom, left:right]
     if view.ground:
         floor = ShadowFloor(vertices, camera, view)
         light = light_at(
@@ -140,13 +147,13 @@ def render(
     paint = linear_light(colours)[owner[seen_of]]
     painted = _painted(paint, light[: len(places)], places, directions, camera, view)
     count = int(whole.sum())
-    image = np.repeat(np.repeat(sheet[framed], samples, axis=0), samples, axis=1)
+    image = np.repeat(np.repeat(page[framed], samples, axis=0), samples, axis=1)
     for part in _places(image, samples):
         part[whole] = painted[:count]
     image[parts] = painted[count:]
     image *= (1.0 - view.edges * _lines(triangle, near, facing, owner))[..., None]
     of_pixel = _places(image, samples)
-    sheet[framed] = sum(of_pixel[1:], of_pixel[0]) / np.float32(samples**2)
+    page[framed] = sum(of_pixel[1:], of_pixel[0]) / np.float32(samples**2)
     return bytes_of_light(sheet)
 
 

@@ -209,7 +209,7 @@ def draw_manual(
         To be laid out by :mod:`fabfold.guide.manual_pdf` or :mod:`fabfold.guide.manual_html`.
     """
     progress = progress or SilentProgress()
-    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
+    meshes = joinery.drawn
     smooth = [corner_normals(vertices, faces) for vertices, faces in meshes]
     drawn = []
     for step, view in zip(plan.groups, plan.group_views, strict=False):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import cycle
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from fabfold.guide.fold_steps import FoldStep
 from fabfold.guide.fonts import font_file
 from fabfold.guide.step_views import StepView
 from fabfold.lattice.rotations import rotation_about
+
+if TYPE_CHECKING:
+    from PIL import ImageFont
 
 __all__ = ["ARROW_SHARES", "MOVING", "STAYING", "StepPicture", "arrow_points", "draw_step"]
 
@@ -37,8 +41,9 @@ _LARGER = 1.5
 _FINER = 3
 
 
-#: Left, top, right and bottom.
+#: Left, top, right and bottom: of a label, and of what is drawn.
 Box2 = tuple[float, float, float, float]
+Window = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
@@ -106,6 +111,66 @@ def arrow_points(
     return np.array([turn[:3, :3] @ start + turn[:3, 3] for turn in turns])
 
 
+@dataclass(frozen=True)
+class _Layout:
+    """Where in the picture of turns that are made at once everything is, before it is drawn."""
+
+    meshes: Sequence[Mesh]
+    step: FoldStep
+    look: View
+    within: NDArray[np.float64]
+    camera: PinholeCamera
+    axes: tuple[NDArray[np.float64], ...]
+    arrows: tuple[NDArray[np.float64], ...]
+    labels: tuple[Box2, ...]
+
+    def drawn(
+        self, smooth: Sequence[NDArray[np.float64]] | None, only: Window | None = None
+    ) -> StepPicture:
+        """The picture, or the part of it that is wanted."""
+        step = self.step
+        colours = np.tile(np.array(STAYING, np.uint8), (len(self.meshes), 1))
+        for turn, colour in zip(step.turns, cycle(MOVING), strict=False):
+            colours[list(turn.moving)] = colour
+        image = render(
+            self.meshes, colours, step.before, self.look,
+            within=self.within, smooth=smooth, only=only,
+        )  # fmt: skip
+        left, top, right, bottom = only or (0, 0, *self.look.size)
+        ghost = _with_ghost(image[top:bottom, left:right], self, (left, top))
+        image[top:bottom, left:right] = ghost
+        for turn, axis, arrow, label in zip(
+            step.turns, self.axes, self.arrows, self.labels, strict=True
+        ):
+            image = _with_marks(image, arrow, axis, _angle(turn), label)
+        return StepPicture(image, self.camera, self.arrows, self.labels)
+
+
+def _laid_out(
+    meshes: Sequence[Mesh],
+    step: FoldStep,
+    view: StepView,
+    voxel_mm: float,
+    size: tuple[int, int],
+) -> _Layout:
+    arcs = [arrow_points(turn, meshes, voxel_mm) for turn in step.turns]
+    within = np.concatenate([posed_points(meshes, step.after), *arcs])
+    look = View(
+        view.azimuth_deg, view.elevation_deg, size=size, ground=False, lights=4, margin=0.05
+    )
+    before = posed_points(meshes, step.before)
+    camera = camera_for(np.concatenate([before, within]), look, size, None)
+    axes: list[NDArray[np.float64]] = []
+    arrows: list[NDArray[np.float64]] = []
+    labels: list[Box2] = []
+    for turn, arc in zip(step.turns, arcs, strict=True):
+        axis = turn.point + np.outer([-0.9, 0.9], turn.axis) * voxel_mm
+        axes.append(project(axis, camera)[:, :2])
+        arrows.append(project(arc, camera)[:, :2])
+        labels.append(_label_place(arrows[-1], _angle(turn), size, labels))
+    return _Layout(meshes, step, look, within, camera, tuple(axes), tuple(arrows), tuple(labels))
+
+
 def draw_step(
     meshes: Sequence[Mesh],
     step: FoldStep,
@@ -138,30 +203,7 @@ def draw_step(
     """
     if step.then:
         return _draw_callout(meshes, step, view, voxel_mm, size, smooth)
-    arcs = [arrow_points(turn, meshes, voxel_mm) for turn in step.turns]
-    after = posed_points(meshes, step.after)
-    within = np.concatenate([after, *arcs])
-    look = View(
-        view.azimuth_deg, view.elevation_deg, size=size, ground=False, lights=4, margin=0.05
-    )
-    colours = np.tile(np.array(STAYING, np.uint8), (len(meshes), 1))
-    for turn, colour in zip(step.turns, cycle(MOVING), strict=False):
-        colours[list(turn.moving)] = colour
-    image = render(meshes, colours, step.before, look, within=within, smooth=smooth)
-    before = posed_points(meshes, step.before)
-    camera = camera_for(np.concatenate([before, within]), look, size, None)
-    image = _with_ghost(image, meshes, step, camera)
-    arrows: list[NDArray[np.float64]] = []
-    labels: list[Box2] = []
-    for turn, arc in zip(step.turns, arcs, strict=True):
-        arrow = project(arc, camera)[:, :2]
-        axis = turn.point + np.outer([-0.9, 0.9], turn.axis) * voxel_mm
-        image, label = _with_marks(
-            image, arrow, project(axis, camera)[:, :2], f"{turn.degrees:g}°", labels
-        )
-        arrows.append(arrow)
-        labels.append(label)
-    return StepPicture(image, camera, tuple(arrows), tuple(labels))
+    return _laid_out(meshes, step, view, voxel_mm, size).drawn(smooth)
 
 
 def _draw_callout(
@@ -185,10 +227,11 @@ def _draw_callout(
     font = ImageFont.truetype(str(font_file(bold=True)), round(size[1] / 20))
     panels = []
     for number, phase in enumerate(step.phases):
-        panel = draw_step(meshes, phase, view, voxel_mm, large, smooth)
+        layout = _laid_out(meshes, phase, view, voxel_mm, large)
+        window = _cut_out(layout, cell)
+        panel = layout.drawn(smooth, window)
         panels.append(panel)
         left, top = cell[0] * (number % across), cell[1] * (number // across)
-        window = _cut_out(panel, meshes, phase, cell)
         shown = PillowImage.fromarray(panel.image).crop(window)
         sheet.paste(shown.resize(cell, PillowImage.Resampling.LANCZOS), (left, top))
         frame = (left + 2, top + 2, left + cell[0] - 3, top + cell[1] - 3)
@@ -197,19 +240,17 @@ def _draw_callout(
     return StepPicture(np.asarray(sheet), panels[0].camera, (), (), tuple(panels))
 
 
-def _cut_out(
-    panel: StepPicture, meshes: Sequence[Mesh], step: FoldStep, cell: tuple[int, int]
-) -> tuple[int, int, int, int]:
-    """Window of a panel about what moves, its arrow and its angle, in the shape of a cell."""
-    moving = list(step.moving)
-    parts = [meshes[body] for body in moving]
+def _cut_out(layout: _Layout, cell: tuple[int, int]) -> Window:
+    """Window of a picture about what moves, its arrow and its angle, in the shape of a cell."""
+    moving = list(layout.step.moving)
+    parts = [layout.meshes[body] for body in moving]
     points = [
-        project(posed_points(parts, poses[moving]), panel.camera)[:, :2]
-        for poses in (step.before, step.after)
+        project(posed_points(parts, poses[moving]), layout.camera)[:, :2]
+        for poses in (layout.step.before, layout.step.after)
     ]
-    labels = np.array(panel.labels).reshape(-1, 2)
-    spots = np.concatenate([*points, *panel.arrows, labels])
-    height, width = panel.image.shape[:2]
+    labels = np.array(layout.labels).reshape(-1, 2)
+    spots = np.concatenate([*points, *layout.arrows, labels])
+    width, height = layout.look.size
     low, high = spots.min(axis=0), spots.max(axis=0)
     middle = (low + high) / 2
     wide, tall = (high - low) * 1.5
@@ -222,29 +263,28 @@ def _cut_out(
 
 
 def _owners(
-    meshes: Sequence[Mesh], poses: NDArray[np.float64], camera: PinholeCamera, size: tuple[int, int]
+    layout: _Layout, poses: NDArray[np.float64], corner: tuple[int, int], size: tuple[int, int]
 ) -> NDArray[np.int64]:
-    """Which body is seen at each pixel (h, w); -1 where there is none."""
+    """Which body is seen at each pixel (h, w) of a window; -1 where there is none."""
     from fabfold.export.raster import fill_triangles
 
-    counts = [len(faces) for _, faces in meshes]
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
+    counts = [len(faces) for _, faces in layout.meshes]
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in layout.meshes)])
     faces = np.concatenate(
-        [faces + start for (_, faces), start in zip(meshes, starts, strict=False)]
+        [faces + start for (_, faces), start in zip(layout.meshes, starts, strict=False)]
     ).astype(np.int32)
-    screen = project(posed_points(meshes, poses), camera)
+    screen = project(posed_points(layout.meshes, poses), layout.camera)
+    screen[:, :2] -= corner
     _, nearest = fill_triangles(screen, faces, *size)
-    owner = np.repeat(np.arange(len(meshes)), counts)
+    owner = np.repeat(np.arange(len(counts)), counts)
     return np.where(nearest >= 0, owner[nearest], -1)
 
 
-def _with_ghost(
-    image: Image, meshes: Sequence[Mesh], step: FoldStep, camera: PinholeCamera
-) -> Image:
-    """A pale image of where the moving bodies end, with an outline."""
-    size = (image.shape[1], image.shape[0])
-    after = _owners(meshes, step.after, camera, size)
-    here = np.isin(_owners(meshes, step.before, camera, size), step.all_moving)
+def _with_ghost(image: Image, layout: _Layout, corner: tuple[int, int]) -> Image:
+    """A pale image of where the moving bodies end, with an outline, in a window of the picture."""
+    step, size = layout.step, (image.shape[1], image.shape[0])
+    after = _owners(layout, step.after, corner, size)
+    here = np.isin(_owners(layout, step.before, corner, size), step.all_moving)
     result = image.astype(np.float64)
     for turn, colour in zip(step.turns, cycle(MOVING), strict=False):
         ends = np.isin(after, turn.moving)
@@ -263,53 +303,68 @@ def _with_ghost(
     return np.asarray(np.rint(result), dtype=np.uint8)
 
 
-def _with_marks(
-    image: Image,
-    arrow: NDArray[np.float64],
-    axis: NDArray[np.float64],
-    text: str,
-    taken: Sequence[Box2],
-) -> tuple[Image, Box2]:
-    """The hinge's line, the arrow, and the angle beside it; bounds of the angle.
+def _angle(turn: FoldStep) -> str:
+    return f"{turn.degrees:g}°"
 
-    The angle is written where none of those in `taken` is.
-    """
+
+def _unit(size: tuple[int, int]) -> float:
+    """Scale of lines and letters in a picture, in pixels; 1 where it is 420 high."""
+    return size[1] / 420
+
+
+def _letters(unit: float) -> ImageFont.FreeTypeFont:
+    from PIL import ImageFont
+
+    return ImageFont.truetype(str(font_file(bold=True)), round(_FINER * 19 * unit))
+
+
+def _with_marks(
+    image: Image, arrow: NDArray[np.float64], axis: NDArray[np.float64], text: str, label: Box2
+) -> Image:
+    """The hinge's line, the arrow, and the angle in its place."""
     from PIL import Image as PillowImage
-    from PIL import ImageDraw, ImageFont
+    from PIL import ImageDraw
 
     height, width = image.shape[:2]
-    layer = PillowImage.new("RGBA", (width * _FINER, height * _FINER), (0, 0, 0, 0))
-    draw = ImageDraw.Draw(layer)
-    unit = _FINER * height / 420
-    _dashes(draw, axis * _FINER, unit)
+    unit = _FINER * _unit((width, height))
     line = arrow * _FINER
     head = _head(line, 17 * unit)
+    # Only what the marks cover is drawn finer.
+    spots = np.concatenate([arrow, axis, head / _FINER, np.array(label).reshape(-1, 2)])
+    rim = int(np.ceil(12 * unit / _FINER))
+    left, top = np.clip(np.floor(spots.min(axis=0)).astype(int) - rim, 0, [width, height])
+    right, bottom = np.clip(np.ceil(spots.max(axis=0)).astype(int) + rim, 0, [width, height])
+    if right <= left or bottom <= top:
+        return image
+    shift = _FINER * np.array([left, top])
+    layer = PillowImage.new("RGBA", tuple(_FINER * np.array([right - left, bottom - top])))
+    draw = ImageDraw.Draw(layer)
+    _dashes(draw, axis * _FINER - shift, unit)
+    line, head = line - shift, head - shift
     body = line[: max(2, int(np.ceil(len(line) * 0.97)))]
     for wide, colour in ((10.5, (255, 255, 255, 235)), (5.5, (20, 20, 20, 255))):
         draw.line(
             [tuple(p) for p in body.tolist()], fill=colour, width=round(wide * unit), joint="curve"
         )
-        rim = (wide - 5.5) * unit / 2
+        edge = (wide - 5.5) * unit / 2
         middle = head.mean(axis=0)
-        grown = middle + (head - middle) * (1 + 2.2 * rim / (17 * unit))
+        grown = middle + (head - middle) * (1 + 2.2 * edge / (17 * unit))
         draw.polygon([tuple(p) for p in grown.tolist()], fill=colour)
-    font = ImageFont.truetype(str(font_file(bold=True)), round(19 * unit))
-    bounds = draw.textbbox((0, 0), text, font=font)
-    finer = [tuple(_FINER * value for value in box) for box in taken]
-    label = _label_place(line, bounds, layer.size, unit, finer)
-    draw.rounded_rectangle(label, radius=7 * unit, fill=(255, 255, 255, 225))
+    plate = _FINER * np.array(label) - np.tile(shift, 2)
+    draw.rounded_rectangle(plate.tolist(), radius=7 * unit, fill=(255, 255, 255, 225))
     draw.text(
-        ((label[0] + label[2]) / 2, (label[1] + label[3]) / 2),
+        ((plate[0] + plate[2]) / 2, (plate[1] + plate[3]) / 2),
         text,
-        font=font,
+        font=_letters(unit / _FINER),
         fill=(20, 20, 20, 255),
         anchor="mm",
     )
-    small = layer.resize((width, height), PillowImage.Resampling.BOX)
-    base = PillowImage.fromarray(image).convert("RGBA")
+    small = layer.resize((right - left, bottom - top), PillowImage.Resampling.BOX)
+    base = PillowImage.fromarray(image[top:bottom, left:right]).convert("RGBA")
     base.alpha_composite(small)
-    x0, y0, x1, y1 = (value / _FINER for value in label)
-    return np.asarray(base.convert("RGB")), (x0, y0, x1, y1)
+    result = image.copy()
+    result[top:bottom, left:right] = np.asarray(base.convert("RGB"))
+    return result
 
 
 def _dashes(draw: object, ends: NDArray[np.float64], unit: float) -> None:
@@ -348,16 +403,17 @@ def _head(line: NDArray[np.float64], size: float) -> NDArray[np.float64]:
 
 
 def _label_place(
-    line: NDArray[np.float64],
-    bounds: tuple[float, float, float, float],
-    size: tuple[int, int],
-    unit: float,
-    taken: Sequence[tuple[float, ...]],
+    arrow: NDArray[np.float64], text: str, size: tuple[int, int], taken: Sequence[Box2]
 ) -> Box2:
-    """Where the angle is written: beside the middle of the arrow, on its outer side, inside."""
-    wide, tall = bounds[2] - bounds[0] + 12 * unit, bounds[3] - bounds[1] + 10 * unit
-    middle = line[len(line) // 2]
-    out = middle - (line[0] + line[-1]) / 2
+    """Where the angle is written: beside the middle of the arrow, on its outer side, inside.
+
+    It is written where none of those in `taken` is; all in pixels.
+    """
+    unit = _unit(size)
+    left, top, right, bottom = (value / _FINER for value in _letters(unit).getbbox(text))
+    wide, tall = right - left + 12 * unit, bottom - top + 10 * unit
+    middle = arrow[len(arrow) // 2]
+    out = middle - (arrow[0] + arrow[-1]) / 2
     length = float(np.linalg.norm(out))
     out = out / length if length > unit else np.array([0.0, -1.0])
     x, y = middle + out * (0.5 * max(wide, tall) + 8 * unit)

@@ -121,5 +121,4 @@ def render_kit(built: BuiltTree, path: Path, size: tuple[int, int], progress: Pr
         write_strip(path, joinery, tree, motion, colours=colours, upright=upright)
         return
     plan = plan_steps(joinery, tree, motion, upright)
-    meshes = [(body.vertices, body.faces) for body in joinery.bodies]
-    write_film(path, meshes, colours, plan, size=size, progress=progress)
+    write_film(path, joinery.drawn, colours, plan, size=size, progress=progress)

@@ -266,7 +266,7 @@ def write_printable(
             printed = posed_kit(joinery, pose)
             metadata["Description"] += f"; {pose.figures}"
         title = f"{name} folds into {tree.template.name}"
-        picture = thumbnail([(body.vertices, body.faces) for body in printed.bodies], colours)
+        picture = thumbnail(printed.drawn, colours)
         write_3mf(
             folder / f"{name}.3mf",
             printed,
