@@ -16,9 +16,10 @@ from export_kits import BARREL_MM, CLEARANCE_MM, row_joinery, row_tree
 
 from fabfold.errors import GeometryError
 from fabfold.export.body_brep import brep_of
+from fabfold.export.round_faces import round_regions
 from fabfold.export.step import write_step
 from fabfold.export.steptext import StepSolid, _string, step_text
-from fabfold.export.surfaces import Axis, Plane, Round, flat_regions, round_regions
+from fabfold.export.surfaces import Axis, Plane, Round, flat_regions
 from fabfold.export.thin import thinned
 from fabfold.export.weld import without_needles
 from fabfold.joinery.bodies import BodyMesh, Joinery

@@ -146,7 +146,7 @@ def brep_of(
     edges: list[BrepEdge] = []
     by_half: dict[int, tuple[int, bool]] = {}
     loops_of: list[list[tuple[tuple[int, bool], ...]]] = [[] for _ in surfaces]
-    size: list[list[float]] = [[] for _ in surfaces]
+    rims_of: list[list[list[int]]] = [[] for _ in surfaces]
     for owner, loop in loops:
         turned = _from_a_stop(loop, starts, stops)
         refs: list[tuple[int, bool]] = []
@@ -167,10 +167,13 @@ def brep_of(
                 edges.append(edge)
             run = []
         loops_of[owner].append(tuple(refs))
-        size[owner].append(_extent(vertices[starts[loop]], surfaces[owner]))
+        rims_of[owner].append(loop)
     made = []
-    for surface, found, extents in zip(surfaces, loops_of, size, strict=True):
-        order = sorted(range(len(found)), key=lambda i: -extents[i])
+    for surface, found, rims in zip(surfaces, loops_of, rims_of, strict=True):
+        order = [0]
+        if len(found) > 1:
+            extents = [_extent(vertices[starts[loop]], surface) for loop in rims]
+            order = sorted(range(len(found)), key=lambda i: -extents[i])
         made.append(Face(surface, tuple(found[i] for i in order)))
     return Brep(vertices, tuple(edges), tuple(made))
 
@@ -202,26 +205,50 @@ def _stops(
     vertex, first, count = np.unique(starts[order], return_index=True, return_counts=True)
     stops = np.zeros(len(vertices), dtype=bool)
     stops[vertex] = True
-    for v, begin in zip(vertex[count == 2].tolist(), first[count == 2].tolist(), strict=True):
-        one, other = int(order[begin]), int(order[begin + 1])
-        sides = {int(region[one]), int(region[twin[one]])}
-        if sides != {int(region[other]), int(region[twin[other]])}:
-            continue
-        before, after = int(starts[twin[one]]), int(starts[twin[other]])
-        arcs = [_arc(vertices, half, starts, twin, region, surfaces) for half in (one, other)]
-        if arcs[0] is not None and arcs[1] is not None:
-            # Less than half a turn between stops: arcs are told apart by their ends.
-            stops[v] = False
-            continue
-        if arcs[0] is None and arcs[1] is None:
-            a, b, c = vertices[before], vertices[v], vertices[after]
-            along = c - a
-            length = float(np.linalg.norm(along))
-            if length > 0 and (b - a) @ (c - b) > 0:
-                away = float(np.linalg.norm(np.cross(b - a, along))) / length
-                if away < _STRAIGHT_MM:
-                    stops[v] = False
+    one, other = order[first[count == 2]], order[first[count == 2] + 1]
+    vertex = vertex[count == 2]
+    same = region[one] == region[twin[other]]
+    same &= region[twin[one]] == region[other]
+    one, other, vertex = one[same], other[same], vertex[same]
+    curved = [_curved(vertices, half, starts, twin, region, surfaces) for half in (one, other)]
+    # Less than half a turn between stops: arcs are told apart by their ends.
+    stops[vertex[curved[0] & curved[1]]] = False
+    flat = ~curved[0] & ~curved[1]
+    before, middle = vertices[starts[twin[one[flat]]]], vertices[vertex[flat]]
+    after = vertices[starts[twin[other[flat]]]]
+    along = after - before
+    length = np.linalg.norm(along, axis=1)
+    away = np.linalg.norm(np.cross(middle - before, along), axis=1)
+    onwards = np.einsum("ij,ij->i", middle - before, after - middle) > 0
+    straight = (length > 0) & onwards & (away < _STRAIGHT_MM * length)
+    stops[vertex[flat][straight]] = False
     return stops
+
+
+def _curved(
+    vertices: NDArray[np.float64],
+    halves: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    twin: NDArray[np.int64],
+    region: NDArray[np.int32],
+    surfaces: Sequence[Surface],
+) -> NDArray[np.bool_]:
+    """Which of some rim edges run on a circle, as :func:`_arc` tells of one."""
+    axes = [surface.axis if isinstance(surface, Round) else None for surface in surfaces]
+    is_round = np.array([axis is not None for axis in axes])
+    found = np.zeros(len(halves), dtype=bool)
+    own = is_round[region[halves]]
+    near = own | is_round[region[twin[halves]]]
+    carrier = region[np.where(own, halves, twin[halves])[near]]
+    along = np.array([-1 if axis is None else axis.direction for axis in axes])[carrier]
+    middle = np.array([(0.0, 0.0, 0.0) if axis is None else axis.point for axis in axes])[carrier]
+    ends = [vertices[starts[side]] - middle for side in (halves[near], twin[halves[near]])]
+    rows = np.arange(len(along))
+    x, y = ([end[rows, (along + k) % 3] for end in ends] for k in (1, 2))
+    sine = np.abs(x[0] * y[1] - x[1] * y[0])
+    radius = np.maximum(np.hypot(x[0], y[0]), np.hypot(x[1], y[1]))
+    found[near] = sine >= ROUND_MM * np.maximum(radius, 1e-9)
+    return found
 
 
 def _arc(

@@ -1,7 +1,7 @@
 """STEP: the bodies as named solids in shape A, with true cylinders and cones at the hinges.
 
 A body's mesh is thinned where it is sculpted, turned into faces (see
-:mod:`fabfold.export.surfaces`), written as STEP text, read
+:mod:`fabfold.export.round_faces`), written as STEP text, read
 back with the CAD kernel, and compared with the mesh. A body whose solid is not valid, or differs
 from its mesh, is written again with flat faces only, and then triangle by triangle.
 """
@@ -19,14 +19,13 @@ from numpy.typing import NDArray
 from fabfold.errors import GeometryError
 from fabfold.export.body_brep import Brep, brep_of
 from fabfold.export.colours import body_colours, palette
+from fabfold.export.round_faces import round_regions, sculpted_triangles
 from fabfold.export.steptext import StepSolid, step_text
 from fabfold.export.surfaces import (
     Axis,
     Plane,
     Surface,
     flat_regions,
-    round_regions,
-    sculpted_triangles,
 )
 from fabfold.export.thin import thinned
 from fabfold.export.weld import weld_rounded, without_needles

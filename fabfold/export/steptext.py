@@ -77,7 +77,8 @@ def _real(value: float) -> str:
 
 
 def _triple(values: Sequence[float]) -> str:
-    return "(" + ",".join(_real(float(value)) for value in values) + ")"
+    x, y, z = values
+    return f"({_real(x)},{_real(y)},{_real(z)})"
 
 
 def _string(text: str) -> str:
@@ -118,19 +119,22 @@ def _axes_of(axis: Axis) -> tuple[list[float], list[float]]:
     return unit[axis.direction].tolist(), unit[(axis.direction + 1) % 3].tolist()
 
 
-def _edge(writer: _Writer, brep: Brep, edge: BrepEdge, vertex: dict[int, int]) -> int:
-    start, end = brep.vertices[edge.start], brep.vertices[edge.end]
+def _edge(
+    writer: _Writer, points: list[list[float]], edge: BrepEdge, vertex: dict[int, int]
+) -> int:
     if edge.axis is None:
-        along = end - start
-        length = float(np.linalg.norm(along))
+        x, y, z = points[edge.start]
+        to_x, to_y, to_z = points[edge.end]
+        length = math.dist((x, y, z), (to_x, to_y, to_z))
         if not length > 0.0:
             raise ValueError("an edge of length zero")
-        vector = writer.add(f"VECTOR('',#{writer.direction((along / length).tolist())},1.)")
-        curve = writer.add(f"LINE('',#{writer.point(start.tolist())},#{vector})")
+        along = ((to_x - x) / length, (to_y - y) / length, (to_z - z) / length)
+        vector = writer.add(f"VECTOR('',#{writer.direction(along)},1.)")
+        curve = writer.add(f"LINE('',#{writer.point((x, y, z))},#{vector})")
     else:
-        z, x = _axes_of(edge.axis)
-        centre = np.asarray(edge.axis.point) + edge.height * np.asarray(z)
-        frame = writer.frame(centre.tolist(), z, x)
+        upwards, sideways = _axes_of(edge.axis)
+        centre = np.asarray(edge.axis.point) + edge.height * np.asarray(upwards)
+        frame = writer.frame(centre.tolist(), upwards, sideways)
         curve = writer.add(f"CIRCLE('',#{frame},{_real(edge.radius)})")
     return writer.add(f"EDGE_CURVE('',#{vertex[edge.start]},#{vertex[edge.end]},#{curve},.T.)")
 
@@ -160,12 +164,13 @@ def _surface(writer: _Writer, brep: Brep, face: Face) -> tuple[int, str]:
 
 def _solid(writer: _Writer, name: str, brep: Brep) -> int:
     vertex: dict[int, int] = {}
+    points = brep.vertices.tolist()  # Plain numbers: an array of three costs more than it holds.
     for edge in brep.edges:
         for index in (edge.start, edge.end):
             if index not in vertex:
-                point = writer.point(brep.vertices[index].tolist())
+                point = writer.point(points[index])
                 vertex[index] = writer.add(f"VERTEX_POINT('',#{point})")
-    edges = [_edge(writer, brep, edge, vertex) for edge in brep.edges]
+    edges = [_edge(writer, points, edge, vertex) for edge in brep.edges]
     faces = []
     for face in brep.faces:
         bounds = []

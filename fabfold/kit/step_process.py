@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import pickle
 import signal
 import subprocess
@@ -131,6 +132,8 @@ def _write(path: Path, joinery: Joinery, tree: FoldTree, retention: Retention | 
 
 if __name__ == "__main__":
     end_with_parent()
+    # Millions of numbers in lists, none of them in a circle: to look for circles takes seconds.
+    gc.disable()
     # Asked to end, it takes its temporary file along.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     _write(*pickle.loads(sys.stdin.buffer.read()))
