@@ -86,7 +86,7 @@ def effective_tools(tools: Tools, solid: manifold3d.Manifold) -> list[manifold3d
         start, end = bounds(tool)
         if not ((start < high).all() and (low < end).all()):
             continue
-        common = solid ^ tool
+        common = evaluated(solid ^ tool)
         if common.volume() <= 1e-6:
             continue
         start, end = bounds(common)

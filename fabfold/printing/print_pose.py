@@ -17,6 +17,7 @@ from fabfold.errors import RecipeError
 from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import Joinery
 from fabfold.joinery.body_poses import poses_in_mm
+from fabfold.joinery.booleans import evaluated
 from fabfold.joinery.cells import solids_of
 from fabfold.lattice.rotations import ROTATIONS
 from fabfold.printing.profiles import Profile
@@ -170,35 +171,28 @@ class _Samples:
 
         Directions are +x, -x, +y, -y, +z, -z of the pose's own frame; hinges are left out of these.
         """
-        import manifold3d
-
         reach = _NARROW * self._joinery.gap_mm
         steep = np.sin(np.radians(profile.max_overhang_deg or 45.0))
+        # Computed now: a ray that meets what is not computed yet computes it for itself.
         placed = [
-            solid.transform(pose[:3]) for solid, pose in zip(self._solids, poses, strict=True)
+            evaluated(solid.transform(pose[:3]))
+            for solid, pose in zip(self._solids, poses, strict=True)
         ]
         boxes = np.array([np.reshape(solid.bounding_box(), (2, 3)) for solid in placed])
         whole, sides = 0.0, np.zeros(6)
         for index, pose in enumerate(poses):
-            near = [
-                placed[other]
-                for other in range(len(placed))
-                if other != index
-                and (boxes[other, 0] - reach <= boxes[index, 1]).all()
-                and (boxes[other, 1] + reach >= boxes[index, 0]).all()
-            ]
-            if not near:
-                continue
-            others = manifold3d.Manifold.compose(near)
             starts = self._points[index] @ pose[:3, :3].T + pose[:3, 3]
             normals = self._normals[index] @ pose[:3, :3].T
             open_to = starts + reach * normals
-            hit = np.array(
-                [
-                    bool(others.ray_cast(tuple(start), tuple(end)))
-                    for start, end in zip(starts, open_to, strict=True)
-                ]
-            )
+            low, high = np.minimum(starts, open_to), np.maximum(starts, open_to)
+            hit = np.zeros(len(starts), dtype=bool)
+            for other, (least, most) in enumerate(boxes):
+                if other == index:
+                    continue
+                near = ~hit & ((low <= most) & (high >= least)).all(axis=1)
+                for point in np.flatnonzero(near).tolist():
+                    ray = tuple(starts[point]), tuple(open_to[point])
+                    hit[point] = bool(placed[other].ray_cast(*ray))
             whole += self._weights[index] * float(hit.sum())
             plain = hit & ~self._at_hinge(index)
             along = np.concatenate([normals > steep, normals < -steep], axis=1)[
