@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from fabfold.errors import RecipeError
-from fabfold.joinery.face_fill import FaceFill, covered_faces, with_filled_faces
+from fabfold.joinery.face_fill import (
+    FaceFill,
+    covered_faces,
+    plate_before,
+    with_filled_faces,
+)
 from fabfold.lattice.rotations import FACES
 from fabfold.lattice.shipped import load_template
 from fabfold.printing.print_mode import print_mode
@@ -66,6 +71,29 @@ def test_a_face_with_nothing_behind_it_stays_open(tree):
     _, fill = with_filled_faces(crumb, tree, depth, voxel_mm=SIDE, inset_mm=INSET, wall_mm=WALL)
     assert (fill.faces, fill.added_mm3) == (0, 0.0)
     assert fill.left_open == len(covered_faces(tree))
+
+
+def test_the_plate_before_a_hollow_stays_away(tree):
+    """The plate that is nearest to a point of its own body, until none is left near it."""
+    depth = np.ones((len(tree.source), 6))
+    voxel, face = covered_faces(tree)[0].tolist()
+    body = next(i for i, found in enumerate(tree.bodies) if voxel in found.voxels)
+    inside = tree.source[voxel] + 0.4 * FACES[face]
+    assert plate_before(tree, depth, body, inside, ()) == (voxel, face)
+    assert plate_before(tree, depth, body, inside + 1.2 * FACES[face], ()) is None
+    others = {tuple(plate) for plate in covered_faces(tree).tolist() if plate[0] == voxel}
+    assert plate_before(tree, depth, body, inside, others - {(voxel, face)}) == (voxel, face)
+    assert plate_before(tree, 0.0 * depth, body, inside, ()) is None
+    assert plate_before(tree, depth, body + 1, inside, ()) != (voxel, face)
+    crowd = manifold3d.Manifold.cube((200.0, 200.0, 200.0), True)
+    sizes = {"voxel_mm": SIDE, "inset_mm": INSET, "wall_mm": WALL}
+    _, whole = with_filled_faces(crowd, tree, depth, **sizes)
+    _, fill = with_filled_faces(crowd, tree, depth, **sizes, without={(voxel, face)})
+    assert (fill.faces, fill.unshut) == (whole.faces - 1, 1)
+    assert fill.after == pytest.approx(whole.after - 1 / 24)
+    assert fill.note(WALL, 1.0).endswith(
+        "; 1 stay open so that powder comes out of a hollow behind"
+    )
 
 
 def test_where_it_means_nothing_it_is_refused():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -59,6 +59,7 @@ def build_bodies(
     wall_mm: float = 0.0,
     chamfer_mm: float = 0.0,
     fill_g_cm3: float | None = None,
+    unfilled: Collection[tuple[int, int]] = (),
     progress: Progress | None = None,
 ) -> Joinery:
     """Make the printed bodies of a kit.
@@ -99,6 +100,8 @@ def build_bodies(
     fill_g_cm3 : float, optional
         Density of the material of plates of `wall_mm` that close open faces of the box from inside;
         without it these stay open.
+    unfilled : collection of (int, int)
+        Voxels and their faces that get no such plate.
     progress : Progress, optional
         Is told how far the work is.
 
@@ -140,6 +143,7 @@ def build_bodies(
             voxel_mm=voxel_mm,
             inset_mm=size.gap_mm / 2,
             wall_mm=wall_mm,
+            without=unfilled,
         )
         filled = (fill.note(wall_mm, fill_g_cm3),)
     hinges = place_hinges(tree, motion, size, voxel_mm)

@@ -7,6 +7,7 @@ lies inside its own cell, inset like all of it, and is cut and certified with th
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ from fabfold.tree.fold_tree import FoldTree
 if TYPE_CHECKING:
     import manifold3d
 
-__all__ = ["FaceFill", "covered_faces", "with_filled_faces"]
+__all__ = ["FaceFill", "covered_faces", "plate_before", "with_filled_faces"]
 
 #: A face with less than this mean depth behind it, in voxel sides, counts as closed.
 _CLOSED = 0.02
@@ -40,6 +41,8 @@ class FaceFill:
         Faces of the box that got a plate.
     left_open : int
         Faces that could have one, but have no material for it to hold to.
+    unshut : int
+        Faces that are left open so that powder comes out of a hollow behind them.
     added_mm3 : float
         Volume of what the plates add, before hinges are cut, mm³.
     before, after : float
@@ -51,11 +54,14 @@ class FaceFill:
     added_mm3: float
     before: float
     after: float
+    unshut: int = 0
 
     def note(self, wall_mm: float, density_g_cm3: float) -> str:
         """What was done, in a maker's words."""
         grams = self.added_mm3 / 1000 * density_g_cm3
         left = f"; {self.left_open} more have no material to hold one" if self.left_open else ""
+        if self.unshut:
+            left += f"; {self.unshut} stay open so that powder comes out of a hollow behind"
         return (
             f"{self.faces} open faces of the box have plates of {wall_mm:g} mm, {grams:.1f} g in "
             f"all: it is closed to {100 * self.after:.0f} % instead of {100 * self.before:.0f} %"
@@ -91,6 +97,46 @@ def covered_faces(tree: FoldTree) -> NDArray[np.int64]:
     return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
+def plate_before(
+    tree: FoldTree,
+    depth: NDArray[np.float64],
+    body: int,
+    point: NDArray[np.float64],
+    without: Collection[tuple[int, int]],
+) -> tuple[int, int] | None:
+    """The plate of a body that is nearest to a point: what shuts the hollow there.
+
+    Parameters
+    ----------
+    tree : FoldTree
+        Where the voxels lie in A and B.
+    depth : (n, 6) float64 array
+        As of :func:`with_filled_faces`.
+    body : int
+        Index of the body.
+    point : (3,) float64 array
+        In lattice units, in A.
+    without : collection of (int, int)
+        Voxels and faces that have no plate.
+
+    Returns
+    -------
+    (int, int) or None
+        Voxel and face as of :func:`covered_faces`; None where no plate is within a voxel's side.
+    """
+    found = []
+    for voxel, face in covered_faces(tree).tolist():
+        if depth[voxel, face] < _CLOSED or (voxel, face) in without:
+            continue
+        if voxel not in tree.bodies[body].voxels:
+            continue
+        away = point - tree.source[voxel] - FACES[face] / 2
+        across = np.maximum(np.abs(away) - np.where(FACES[face] == 0, 0.5, 0.0), 0.0)
+        found.append((float(np.linalg.norm(across)), voxel, face))
+    nearest = min(found, default=(1.0, 0, 0))
+    return nearest[1:] if nearest[0] < 1.0 else None
+
+
 def with_filled_faces(
     model: manifold3d.Manifold,
     tree: FoldTree,
@@ -99,6 +145,7 @@ def with_filled_faces(
     voxel_mm: float,
     inset_mm: float,
     wall_mm: float,
+    without: Collection[tuple[int, int]] = (),
 ) -> tuple[manifold3d.Manifold, FaceFill]:
     """The model with plates behind the open faces of the box that another voxel covers in A.
 
@@ -116,6 +163,8 @@ def with_filled_faces(
         Half the gap between bodies, mm.
     wall_mm : float
         Thickness of a plate, mm.
+    without : collection of (int, int)
+        Voxels and faces, as of :func:`covered_faces`, that get no plate.
 
     Returns
     -------
@@ -132,7 +181,7 @@ def with_filled_faces(
     plates: list[manifold3d.Manifold] = []
     left, added, closed = 0, 0.0, 0.0
     for voxel, face in covered_faces(tree).tolist():
-        if depth[voxel, face] < _CLOSED:
+        if depth[voxel, face] < _CLOSED or (voxel, face) in without:
             continue
         middle, normal = voxel_mm * tree.source[voxel], FACES[face]
         place = (middle + normal * (reach - wall / 2)).tolist()
@@ -149,5 +198,5 @@ def with_filled_faces(
         closed += float(depth[voxel, face])
     before = closed_share(tree)
     after = before + closed / visible_faces(tree.template)
-    fill = FaceFill(len(plates), left, added, before, after)
+    fill = FaceFill(len(plates), left, added, before, after, len(without))
     return (union([model, *plates]) if plates else model), fill

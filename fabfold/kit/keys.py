@@ -77,7 +77,8 @@ def join_key(recipe: Recipe, template: Template, mode: PrintMode, mark: list[Any
             *([mode.pin] if mode.apart else []),
             *astuple(mode.hold),
             mode.blocks,
-            mode.fill,
+            # Plates that would keep powder in are left out.
+            mode.fill and "unshut",
         ],
         "walls",
     )

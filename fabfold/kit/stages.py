@@ -90,26 +90,12 @@ def build(
     CheckError
         If its bodies come too near to each other on the path, or fit no plate.
     """
-    from fabfold.joinery.build import build_bodies
-    from fabfold.joinery.lattice_skin import CHAMFER_SHARE, blocks_of
     from fabfold.joinery.loose_pins import meshes_with_pins
     from fabfold.kit.holding import hold_kit
     from fabfold.proof.certify import certify, certify_orders
 
     profile, apart = mode.profile, None
-    joinery = build_bodies(
-        blocks_of(planned.voxels) if mode.blocks else planned.voxels,
-        planned.tree,
-        planned.motion,
-        voxel_mm=voxel_mm,
-        clearance_mm=profile.clearance_mm,
-        face_gap_mm=mode.face_gap_mm,
-        pin=mode.loose_pin(),
-        wall_mm=profile.min_wall_mm,
-        chamfer_mm=CHAMFER_SHARE * voxel_mm if mode.blocks else 0.0,
-        fill_g_cm3=profile.density_g_cm3 if mode.fill else None,
-        progress=progress,
-    )
+    joinery = _bodies(planned, mode, voxel_mm, progress)
     if mode.apart:
         from fabfold.apart.apart_kit import prepare_apart
 
@@ -146,6 +132,47 @@ def build(
         )
     motion = replace(motion, certificate=certificate)
     return BuiltTree(replace(planned, motion=motion), joinery, refused, apart, retention)
+
+
+def _bodies(planned: PlannedTree, mode: PrintMode, voxel_mm: float, progress: Progress) -> Joinery:
+    """The bodies, without the plates that would keep powder in a hollow behind them."""
+    from fabfold.joinery.build import build_bodies
+    from fabfold.joinery.face_fill import plate_before
+    from fabfold.joinery.lattice_skin import CHAMFER_SHARE, blocks_of
+    from fabfold.printing.chambers import find_chambers
+    from fabfold.voxels.features import features
+
+    profile = mode.profile
+    unfilled: set[tuple[int, int]] = set()
+    while True:
+        joinery = build_bodies(
+            blocks_of(planned.voxels) if mode.blocks else planned.voxels,
+            planned.tree,
+            planned.motion,
+            voxel_mm=voxel_mm,
+            clearance_mm=profile.clearance_mm,
+            face_gap_mm=mode.face_gap_mm,
+            pin=mode.loose_pin(),
+            wall_mm=profile.min_wall_mm,
+            chamfer_mm=CHAMFER_SHARE * voxel_mm if mode.blocks else 0.0,
+            fill_g_cm3=profile.density_g_cm3 if mode.fill else None,
+            unfilled=unfilled,
+            progress=progress,
+        )
+        if not mode.fill or profile.escape_mm is None:
+            return joinery
+        depth = features(planned.voxels).depth
+        shut: set[tuple[int, int]] = set()
+        for index, body in enumerate(joinery.bodies):
+            for chamber in find_chambers([body], profile.escape_mm):
+                middle = np.subtract(chamber.middle_mm, joinery.origin_mm) / joinery.voxel_mm
+                plate = plate_before(planned.tree, depth, index, middle, unfilled)
+                if plate is not None:
+                    shut.add(plate)
+        if not shut:
+            return joinery
+        progress.update(None, f"{len(shut)} plates would keep powder in: without them")
+        unfilled |= shut
 
 
 def build_first(
