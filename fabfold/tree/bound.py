@@ -197,8 +197,8 @@ class ClosingBound:
         """
         cost = depth_by_pose(depth, self._shown)
         empty = self._shown.sum(axis=1).astype(np.float64)
-        turns = phase_rotations(self._labels, source, self._cells)
-        bounds = (_assigned(cost, empty, turns[phase]) for phase in self._phases)
+        phases = phase_rotations(self._labels, source, self._cells, self._phases)
+        bounds = (_assigned(cost, empty, turns) for turns in phases)
         return min((bound.energy for bound in bounds if bound is not None), default=np.inf)
 
 

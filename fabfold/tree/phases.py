@@ -90,6 +90,7 @@ def phase_rotations(
     labels: NDArray[np.int32],
     source: NDArray[np.int32],
     cells: NDArray[np.int32],
+    phases: Sequence[int] | None = None,
 ) -> list[NDArray[np.int8]]:
     """Rotations that each voxel can have in each cell, phase by phase.
 
@@ -101,19 +102,35 @@ def phase_rotations(
         Cell of each voxel in shape A.
     cells : (m, 3) int32 array
         Cells of the template.
+    phases : sequence of int, optional
+        Numbers of the phases that are wanted; all by default.
 
     Returns
     -------
     list of (n, m, k) int8 arrays
-        For each phase the rotations, filled up with -1 at the end; k is the most that there are.
+        For each of these phases the rotations, filled up with -1 at the end; k is the most that
+        there are.
     """
+    rows, columns = _number(source)[:, None], _number(cells)[None, :]
+    listed = _listed(labels.tobytes())
+    wanted = range(len(listed)) if phases is None else phases
+    return [listed[phase][rows, columns] for phase in wanted]
+
+
+@lru_cache
+def _listed(labels: bytes) -> list[NDArray[np.int8]]:
+    """For each phase the rotations by source cell and template cell modulo 2, (8, 8, k).
+
+    Taken as bytes, so that it is remembered: every voxelization that is looked at asks for it.
+    """
+    phases = np.frombuffer(labels, dtype=np.int32).reshape(8, 8, 24)
     found = []
-    for phase in range(int(labels.max()) + 1):
-        here = labels == phase
+    for phase in range(int(phases.max()) + 1):
+        here = phases == phase
         # Stable, so that the rotations that there are come first, in their order.
         order = np.argsort(~here, axis=2, kind="stable")
         count = here.sum(axis=2)
         most = int(count.max())
         listed = np.where(np.arange(most) < count[:, :, None], order[:, :, :most], -1)
-        found.append(listed[_number(source)[:, None], _number(cells)[None, :]].astype(np.int8))
+        found.append(listed.astype(np.int8))
     return found
