@@ -14,7 +14,8 @@ from fabfold.errors import CheckError
 from fabfold.fold.motion import Motion
 from fabfold.proof.bvh import new_box_trees, refit
 from fabfold.proof.certify import certify
-from fabfold.proof.gap import DONE, FAILED, prove_gap, triangle_distance
+from fabfold.proof.gap import DONE, FAILED, prove_gap
+from fabfold.proof.triangles import plane_gap, triangle_distance
 
 VOXEL = 10.0
 ORIGIN = (3.0, -2.0, 7.0)
@@ -216,6 +217,13 @@ def test_triangle_distance_against_fcl():
         found = triangle_distance(one, two, nearest)
         assert found == pytest.approx(max(0.0, fcl.distance(*models)), abs=1e-7)
         assert np.linalg.norm(nearest[0] - nearest[1]) == pytest.approx(found, abs=1e-9)
+        assert plane_gap(one, two) <= found + 1e-12
+    # Of a corner over a face, and of two parallel faces, it is the distance itself.
+    face = np.array([(0.0, 0, 0), (3, 0, 0), (0, 3, 0)])
+    over = np.array([(0.5, 0.5, 0.7), (1, 1, 2), (0, 1, 3)])
+    assert plane_gap(face, over) == plane_gap(over, face) == pytest.approx(0.7, abs=1e-12)
+    assert plane_gap(face, face - (0.2, 0.1, 0.4)) == pytest.approx(0.4, abs=1e-12)
+    assert plane_gap(face, over[:, [2, 1, 0]]) < 0.5
 
 
 def test_printed_hinges_keep_their_clearance_on_the_whole_path():
