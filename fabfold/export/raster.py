@@ -20,6 +20,24 @@ __all__ = ["cast_light", "fill_depth", "fill_triangles", "surface_points"]
 
 
 @njit(cache=True)
+def _span(u: float, v: float, ux: float, vx: float, most: int) -> tuple[int, int]:
+    """First and last of the columns 0 to `most` of a row that lie in a triangle.
+
+    `u` and `v` are the shares of two of its corners at column 0, and grow by `ux` and `vx`.
+    """
+    first, last = 0, most
+    for value, slope in ((u, ux), (v, vx), (1.0 - u - v, -(ux + vx))):
+        if slope > 0.0:
+            if value < 0.0:
+                first = max(first, math.ceil(min(-value / slope, most + 1.0) - 1e-9))
+        elif value < 0.0:
+            return 0, -1
+        elif slope < 0.0:
+            last = min(last, math.floor(min(value / -slope, float(most)) + 1e-9))
+    return first, last
+
+
+@njit(cache=True)
 def fill_triangles(
     screen: Floats, corners: Ints, width: int, height: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
@@ -56,19 +74,20 @@ def fill_triangles(
         right = min(width - 1, math.floor(max(ax, bx, cx) - 0.5))
         top = max(0, math.ceil(min(ay, by, cy) - 0.5))
         bottom = min(height - 1, math.floor(max(ay, by, cy) - 0.5))
+        # All is linear over the triangle: a division a side and row, an addition a pixel.
+        ux, uy = (by - cy) / area, (cx - bx) / area
+        vx, vy = (cy - ay) / area, (ax - cx) / area
+        step = ux * screen[a, 2] + vx * screen[b, 2] - (ux + vx) * screen[c, 2]
         for row in range(top, bottom + 1):
-            y = row + 0.5
-            for column in range(left, right + 1):
-                x = column + 0.5
-                u = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / area
-                v = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / area
-                w = 1.0 - u - v
-                if u < 0.0 or v < 0.0 or w < 0.0:
-                    continue
-                near = u * screen[a, 2] + v * screen[b, 2] + w * screen[c, 2]
-                if near > nearness[row, column]:
-                    nearness[row, column] = near
-                    triangle[row, column] = t
+            u = ux * (left + 0.5 - cx) + uy * (row + 0.5 - cy)
+            v = vx * (left + 0.5 - cx) + vy * (row + 0.5 - cy)
+            first, last = _span(u, v, ux, vx, right - left)
+            near = u * screen[a, 2] + v * screen[b, 2] + (1.0 - u - v) * screen[c, 2]
+            for column in range(first, last + 1):
+                here = near + column * step
+                if here > nearness[row, left + column]:
+                    nearness[row, left + column] = here
+                    triangle[row, left + column] = t
     return nearness, triangle
 
 
@@ -163,22 +182,17 @@ def fill_depth(flat: Floats, corners: Ints, size: int) -> NDArray[np.float32]:
         bottom = min(size - 1, math.floor(max(ay, by, cy) - 0.5))
         if left > right or top > bottom:
             continue
-        # Height is linear over the triangle: one division a triangle, additions a texel.
-        ux = (by - cy) / area
-        vx = (cy - ay) / area
-        uy = (cx - bx) / area
-        vy = (ax - cx) / area
+        ux, uy = (by - cy) / area, (cx - bx) / area
+        vx, vy = (cy - ay) / area, (ax - cx) / area
+        step = ux * flat[a, 2] + vx * flat[b, 2] - (ux + vx) * flat[c, 2]
         for row in range(top, bottom + 1):
-            y = row + 0.5
-            u = ux * (left + 0.5 - cx) + uy * (y - cy)
-            v = vx * (left + 0.5 - cx) + vy * (y - cy)
-            for column in range(left, right + 1):
-                w = 1.0 - u - v
-                if u >= 0.0 and v >= 0.0 and w >= 0.0:
-                    high = u * flat[a, 2] + v * flat[b, 2] + w * flat[c, 2]
-                    depth[row, column] = max(depth[row, column], high)
-                u += ux
-                v += vx
+            u = ux * (left + 0.5 - cx) + uy * (row + 0.5 - cy)
+            v = vx * (left + 0.5 - cx) + vy * (row + 0.5 - cy)
+            first, last = _span(u, v, ux, vx, right - left)
+            high = u * flat[a, 2] + v * flat[b, 2] + (1.0 - u - v) * flat[c, 2]
+            for column in range(first, last + 1):
+                here = high + column * step
+                depth[row, left + column] = max(depth[row, left + column], here)
     return depth
 
 
