@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pymeshlab
 import pytest
 
 from fabfold.export.camera import View, direction_frame, project
@@ -24,6 +25,7 @@ from fabfold.guide.step_drawing import MOVING, STAYING, draw_step
 from fabfold.guide.step_views import _blocks, _planned, visible_share
 from fabfold.guide.wording import step_text
 from fabfold.joinery.body_poses import poses_in_mm
+from fabfold.meshes import is_closed
 
 #: Least share of what moves that must be seen at the start of a step, and pixels that it covers.
 LEAST_SEEN, LEAST_PIXELS = 0.3, 1500
@@ -53,6 +55,23 @@ def phases(kit: SimpleNamespace, drawn: list[Any]) -> Iterator[tuple[Any, Any, A
     for step, view, picture in zip(kit.plan.groups, kit.plan.group_views, drawn, strict=False):
         for phase, panel in zip(step.phases, picture.panels or (picture,), strict=True):
             yield phase, view, panel
+
+
+def test_pictures_are_drawn_from_meshes_as_fine_as_they_show(kit: SimpleNamespace) -> None:
+    """Fewer triangles, closed, and no further from the body than a two-hundredth of a voxel."""
+    most = 0.005 * kit.joinery.voxel_mm
+    for body, (points, triangles) in zip(kit.joinery.bodies, kit.joinery.drawn, strict=True):
+        assert len(triangles) < 0.7 * len(body.faces)
+        assert is_closed(triangles)
+        meshes = pymeshlab.MeshSet()
+        meshes.add_mesh(pymeshlab.Mesh(body.vertices, body.faces))
+        meshes.add_mesh(pymeshlab.Mesh(points, triangles))
+        for one, other in ((0, 1), (1, 0)):
+            found = meshes.get_hausdorff_distance(
+                sampledmesh=one, targetmesh=other, samplevert=True, sampleface=True
+            )
+            assert found["max"] <= most + 1e-6
+    assert kit.joinery.drawn is kit.joinery.drawn  # Found once.
 
 
 def relative(poses: np.ndarray) -> np.ndarray:

@@ -90,10 +90,12 @@ def _rungs(
 
 _SCHEDULES: dict[str, tuple[Rung, ...]] = {
     "quick": _rungs(EFFORTS["quick"], (2, 2), ((2, 1),), ((1, 0), (1, 2))),
-    "normal": _rungs(EFFORTS["normal"], (4, 4), ((2, 1),), ((4, 0), (2, 4))),
+    "normal": _rungs(EFFORTS["normal"], (4, 4), ((2, 1),), ((2, 0), (2, 6))),
     # On large templates a seed takes ten times as long, and few of them fold: what more of them
-    # find does not pay.
-    "normal, large": _rungs(EFFORTS["normal"], (2, 2), ((2, 1),), ((1, 0), (1, 2))),
+    # find does not pay, nor does a second start where the first did not fold.
+    "normal, large": _rungs(
+        replace(EFFORTS["normal"], restarts=1), (2, 2), ((2, 1),), ((1, 0), (1, 4))
+    ),
     "thorough": _rungs(
         EFFORTS["thorough"],
         (12, 6),
