@@ -186,12 +186,17 @@ def test_fewer_seeds_search_a_large_template_at_normal_effort():
         assert (usual != large) == fewer
         assert usual[0] == large[0]  # the guarantee
         if fewer:
-            assert sum(rung.seeds for rung in large) < sum(rung.seeds for rung in usual) / 2
-            # As long as the others, but for fewer kicks at the end.
-            kicks = [sum(rung.effort.kicks for rung in rungs) for rungs in (large, usual)]
-            assert kicks[0] < kicks[1]
+            seeds, kicks = (
+                [sum(of(rung) for rung in rungs) for rungs in (large, usual)]
+                for of in (lambda rung: rung.seeds, lambda rung: rung.seeds * rung.effort.kicks)
+            )
+            assert seeds[0] < seeds[1]
+            assert kicks[0] < kicks[1] / 2
+            # As long as the others, but for the kicks, and with one start each.
             few, many = ({replace(r.effort, kicks=0) for r in rungs} for rungs in (large, usual))
-            assert few <= many
+            assert few - {large[0].effort} == {
+                replace(effort, restarts=1) for effort in many - {usual[0].effort}
+            }
 
 
 @pytest.mark.parametrize("effort", ["quick", "normal", "thorough"])

@@ -255,7 +255,7 @@ def sample_path(
         Most degrees between two poses that are searched for collisions.
     gap_step_deg : float, optional
         The same for the distance, which takes FCL some twenty times as long; default `step_deg`.
-        It is measured at both ends of every move in any case.
+        It is measured in shape A and at the end of every move in any case.
     progress : Progress, optional
         Hears of every move.
 
@@ -337,6 +337,7 @@ def _see_move(
             watch.bodies, {n: turned @ poses[n] for n in linkage.names if n in carried}
         )
         where = f"{move}, {abs(angle):g}°"
-        measure = k % every == 0 or k == count
+        # At the start each pair stands as shape A or an earlier move has left it, and was measured.
+        measure = k > 0 and (k % every == 0 or k == count)
         if not watch.see(moving, resting, moving.apart(resting), where, measure):
             return
