@@ -467,7 +467,7 @@ def main(arguments: list[str] | None = None) -> None:
     # Packages start Python too (glfw does, for MuJoCo): none of them takes a numpy.py in the
     # working folder for numpy.
     os.environ["PYTHONSAFEPATH"] = "1"
-    # Its threads wait for each other longer than they work on matrices as small as ours.
+    # BLAS' threads wait for each other longer than they work on matrices as small as ours.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for stream in (sys.stdout, sys.stderr):
         # A terminal that knows ASCII only shows a question mark, and the run goes on.
