@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import shutil
 import subprocess
@@ -159,7 +160,13 @@ def main() -> None:
         kit = options.kits / name.replace(":", "-")
         shutil.rmtree(kit, ignore_errors=True)
         command = [sys.executable, __file__, "--one", source, template, str(kit)]
-        done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
+        done = subprocess.run(
+            command,
+            capture_output=True,
+            encoding="utf-8",
+            check=False,
+            env={"OPENBLAS_NUM_THREADS": "1", **os.environ},  # As the command line has it.
+        )
         if done.returncode:
             sys.exit(f"{name}: {done.stderr}")
         row = json.loads(done.stdout.splitlines()[-1])
