@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
 from fabfold.meshes import compact, weld
+from fabfold.solid.crossing import really_crossing
 
 if TYPE_CHECKING:
     import manifold3d
@@ -116,7 +117,7 @@ def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDAr
 def crossing_triangles(
     vertices: NDArray[np.float64], faces: NDArray[np.int32]
 ) -> NDArray[np.int64]:
-    """Triangles of a mesh that cross others, as MeshLab finds them.
+    """Triangles of a mesh that cross others: of those that MeshLab finds, the ones that really do.
 
     Parameters
     ----------
@@ -132,7 +133,8 @@ def crossing_triangles(
     """
     meshes = meshlab_set(vertices, faces)
     meshes.compute_selection_by_self_intersections_per_face()
-    return np.flatnonzero(meshes.current_mesh().face_selection_array()).astype(np.int64)
+    found = np.flatnonzero(meshes.current_mesh().face_selection_array()).astype(np.int64)
+    return really_crossing(vertices, faces, found)
 
 
 def meshlab_set(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> pymeshlab.MeshSet:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fabfold.joinery.bodies import BodyMesh
-from fabfold.joinery.soundness import meshlab_set
+from fabfold.joinery.soundness import crossing_triangles, meshlab_set
 from fabfold.printing.checks import Check
 from fabfold.progress import Progress
 
@@ -38,8 +38,7 @@ def check_topology(bodies: Sequence[BodyMesh], progress: Progress) -> list[Check
         opened.append(int(measures["boundary_edges"]))
         branching.append(_shared_edges(body) + int(measures["non_two_manifold_vertices"]))
         pieces.append(int(measures["connected_components_number"]) - 1)
-        meshes.compute_selection_by_self_intersections_per_face()
-        crossing.append(int(meshes.current_mesh().selected_face_number()))
+        crossing.append(len(crossing_triangles(body.vertices, body.faces)))
     count = len(names)
 
     def check(name: str, values: list[int], unit: str, fine: str) -> Check:
