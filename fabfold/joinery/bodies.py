@@ -158,11 +158,12 @@ class Joinery:
         """
         meshes = []
         for body in self.bodies:
-            solid = to_manifold(body.vertices, body.faces).simplify(_DRAWN_SHARE * self.voxel_mm)
+            mesh = body.vertices, body.faces
             # What is no closed manifold, such as a sketch of voxels, is drawn as it is.
-            if solid.is_empty():
-                meshes.append((body.vertices, body.faces))
-            else:
-                points, triangles = to_mesh(solid)
-                meshes.append((points, triangles.astype(np.int32)))
+            if len(body.faces):
+                solid = to_manifold(*mesh).simplify(_DRAWN_SHARE * self.voxel_mm)
+                if not solid.is_empty():
+                    points, triangles = to_mesh(solid)
+                    mesh = points, triangles.astype(np.int32)
+            meshes.append(mesh)
         return meshes

@@ -34,8 +34,9 @@ def to_manifold(vertices: Points, faces: NDArray[np.integer[Any]]) -> manifold3d
 
     return manifold3d.Manifold(
         manifold3d.Mesh64(
-            np.ascontiguousarray(vertices, dtype=np.float64),
-            np.ascontiguousarray(faces, dtype=np.uint64),
+            # Writable, which arrays of a manifold are not.
+            np.require(vertices, np.float64, ["C", "W"]),
+            np.require(faces, np.uint64, ["C", "W"]),
         )
     )
 
