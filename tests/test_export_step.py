@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import manifold3d as m3
 import numpy as np
 import pytest
+import trimesh
 from build123d import import_step
 from export_kits import BARREL_MM, CLEARANCE_MM, row_joinery, row_tree
 
@@ -286,6 +287,18 @@ def test_thinned_keeps_the_rest_and_the_shape():
     kept = np.unique(points[np.abs(points[:, 2] + 4) < 1e-9].round(9), axis=0)
     assert np.array_equal(rim, kept)
     assert (np.linalg.norm(points, axis=1) < 10.1).all()
+
+
+@pytest.mark.parametrize("tolerance", [0.02, 0.05, 0.2])
+def test_thinned_stays_within_its_bound(tolerance):
+    # A thin plate on a ball: few triangles change the volume little and the shape much.
+    shape = m3.Manifold.sphere(10, 96) + m3.Manifold.cylinder(0.6, 14, 13.5, 96, True)
+    vertices, faces = _mesh(shape)
+    points, triangles = thinned(vertices, faces, np.ones(len(faces), dtype=bool), tolerance)
+    assert len(triangles) < len(faces)
+    for one, other in (((vertices, faces), points), ((points, triangles), vertices)):
+        away = trimesh.proximity.closest_point(trimesh.Trimesh(*one, process=False), other)[1]
+        assert away.max() <= tolerance + 1e-4  # MeshLab measures in single precision
 
 
 def test_thinned_gives_back_what_it_cannot_thin():

@@ -43,8 +43,9 @@ VOLUME_SHARE = 0.01
 #: Shorter edges are the last digits of single precision, which the CAD kernel cannot take; and
 #: those that go too where it says that a face crosses itself, far below what anything prints.
 _SHORTEST_MM, _SHORT_MM = 2e-5, 2e-3
-#: Sculpted surfaces may be thinned to within this share of the voxel side.
-THIN_SHARE = 0.003
+#: Sculpted surfaces may be thinned to within this share of the voxel side, and to within this share
+#: of the clearance: two bodies stay apart though both have moved.
+THIN_SHARE, THIN_CLEARANCE = 0.0075, 0.25
 #: What is tried in turn: the faces, the shortest edge that stays, and whether the mesh is
 #: simplified so far as well, which takes triangles away whose corners lie on one line. Slivers may
 #: cross themselves, thinned surfaces too, and round faces may be refused.
@@ -171,7 +172,8 @@ def write_step(
     if colours is None:
         colours = palette(len(joinery.bodies)) if tree is None else body_colours(tree)
     # Without the tree nothing tells barrels from sculpted surfaces, so nothing is thinned.
-    thin_mm = THIN_SHARE * joinery.voxel_mm if tree is not None else 0.0
+    thin_mm = min(THIN_SHARE * joinery.voxel_mm, THIN_CLEARANCE * joinery.clearance_mm)
+    thin_mm = thin_mm if tree is not None else 0.0
     axes = barrel_axes(joinery, tree) if tree is not None else [[] for _ in joinery.bodies]
     application = f"fabfold {__version__}"
     solids, plain, volume = [], [], 0.0

@@ -10,7 +10,7 @@ from fabfold.meshes import is_closed, mesh_volume
 __all__ = ["thinned"]
 
 #: Shares of the sculpted triangles to try to get by with.
-_SHARES = (0.12, 0.25, 0.4, 0.6, 0.8)
+_SHARES = (0.25, 0.4, 0.6, 0.8)
 #: The thinned mesh may change the volume by this share.
 _VOLUME_SHARE = 0.003
 
@@ -74,12 +74,13 @@ def thinned(
             continue
         if abs(mesh_volume(points, triangles) - volume) > _VOLUME_SHARE * volume:
             continue
+        # No more corners than `samplenum` would be looked at.
         if all(
             meshes.get_hausdorff_distance(
-                sampledmesh=one, targetmesh=other, samplevert=True, samplenum=1
+                sampledmesh=one, targetmesh=1 - one, samplevert=True, samplenum=len(vertices)
             )["max"]
             <= tolerance_mm
-            for one, other in ((0, 1), (1, 0))
+            for one in (0, 1)
         ):
             return points, triangles
     return vertices, faces
