@@ -14,6 +14,7 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -21,14 +22,14 @@ import numpy as np
 from fabfold.child_process import end_with_parent, module_call
 from fabfold.progress import Progress
 
-__all__ = ["HALVES", "KernelCompiler", "compile_half", "kernel_stamp"]
+__all__ = ["HALVES", "KernelCompiler", "compile_half", "forget_stale_kernels", "kernel_stamp"]
 
 #: What the processes compile.
 HALVES = ("tree", "fold")
 #: Seconds between looks at the processes.
 _TICK = 0.2
-#: Packages whose sources the kernels are made of.
-_PACKAGES = ("fold", "lattice", "tree")
+#: Packages that have kernels.
+_PACKAGES = ("export", "fold", "lattice", "proof", "solid", "tree", "voxels")
 
 
 def kernel_stamp() -> Path:
@@ -48,6 +49,36 @@ def kernel_stamp() -> Path:
     if not os.access(folder if folder.exists() else folder.parent, os.W_OK):
         folder = Path.home() / ".cache" / "fabfold"
     return folder / f"kernels-{digest.hexdigest()[:16]}.stamp"
+
+
+def forget_stale_kernels(root: Path) -> int:
+    """Remove compiled kernels that are older than any source of kernels.
+
+    numba compiles a kernel anew where the file that it stands in has changed, but not where a
+    kernel that it calls has, in another file. So after an update, which leaves compiled kernels
+    where they are, old code would be called. Kernels in a folder of the user's own
+    (``NUMBA_CACHE_DIR``) are left alone: it may hold those of others.
+
+    Parameters
+    ----------
+    root : Path
+        Folder of the package.
+
+    Returns
+    -------
+    int
+        How many kernels were removed.
+    """
+    sources = (path for name in _PACKAGES for path in (root / name).glob("*.py"))
+    newest = max((path.stat().st_mtime for path in sources), default=0.0)
+    removed = 0
+    for name in _PACKAGES:
+        for index in (root / name / "__pycache__").glob("*.nbi"):  # without it no code is found
+            with suppress(OSError):  # Another process may do the same, or the folder be read-only.
+                if index.stat().st_mtime < newest:
+                    index.unlink()
+                    removed += 1
+    return removed
 
 
 class KernelCompiler:
@@ -72,8 +103,12 @@ class KernelCompiler:
 
     def start(self) -> bool:
         """Begin, unless the kernels are there or it has begun already; whether there is work."""
+        from numba.core import config
+
         if self._running or self._stamp.exists():
             return bool(self._running)
+        if not config.CACHE_DIR:
+            forget_stale_kernels(Path(__file__).resolve().parents[1])
         atexit.register(self.close)  # where the run ends before the search begins
         for half in HALVES:
             command, environment = module_call("fabfold.search.kernels", half)
