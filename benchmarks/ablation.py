@@ -128,35 +128,35 @@ def run_variant(
     if variant != PRODUCT:
         options = fullest(options, max(1, len(options) // 4))
     rounds = runs.rounds_of(kit, runs.recipe_of(kit, seed, joints), options)
-    first = rounds._seeds(0)[0]
-
-    def job_of(search_seed: int) -> Any:
-        job = rounds.job(search_seed)
-        known = isinstance(job, Job)
-        return changed(variant, job, rounds.voxels(search_seed)) if known else None
-
-    jobs = (job_of(first + k) for k in range(len(options)))
-    kernels = runs.warm_up(next(job for job in jobs if job is not None), joints)
+    known = (
+        (number, changed(variant, job, rounds.voxels(number)))
+        for number, job in runs.jobs_of(rounds)
+        if isinstance(job, Job)
+    )
+    kernels = runs.warm_up(next(known)[1], joints)
+    rounds = runs.rounds_of(kit, rounds.recipe, options)
     clock = runs.Recorder(seconds)
-    number, folded = first, []
-    while not clock.over():
-        job = job_of(number)
-        if job is not None:
-            before, started, best = len(clock.events), clock.cpu, clock.best
-            clock.best = float("inf")
-            found = run_seed(job, number, clock.report, clock.over)
-            if found.failed:
-                raise SystemExit(found.why)
-            for event in clock.events[before:]:
-                event["voxels"] = len(rounds.voxels(number))
-            some = len(clock.events) > before
-            folded.append([round(clock.cpu - started, 2), some, found.cut is not None])
-            clock.best = min(best, clock.best)
-        number += 1
+    folded = []
+    for number, job in runs.jobs_of(rounds):
+        if clock.over():
+            break
+        if not isinstance(job, Job):
+            continue
+        mine = changed(variant, job, rounds.voxels(number))
+        before, started, best = len(clock.events), clock.cpu, clock.best
+        clock.best = float("inf")
+        found = run_seed(mine, number, clock.report, clock.over)
+        if found.failed:
+            raise SystemExit(found.why)
+        for event in clock.events[before:]:
+            event["voxels"] = len(rounds.voxels(number))
+        some = len(clock.events) > before
+        folded.append([round(clock.cpu - started, 2), some, found.cut is not None])
+        clock.best = min(best, clock.best)
     return {
         "kernels": kernels,
         "cpu": clock.cpu,
-        "voxels": [len(voxels) for voxels in rounds.options],
+        "voxels": [len(voxels) for voxels in options],
         "starts": folded,
         "events": clock.events,
     }
@@ -208,7 +208,7 @@ def run_growth(model: runs.Model, folder: Path, variant: str, seed: int, joints:
     kit = runs.voxelized(model, folder)
     recipe = runs.recipe_of(kit, seed, joints)
     rounds = runs.rounds_of(kit, recipe, fullest(kit.voxelize(), 1))
-    job = rounds.job(rounds._seeds(0)[0])
+    job = next(job for _, job in runs.jobs_of(rounds))
     problem, effort = job.problem, job.effort
     tables = problem.tables
     rng = np.random.default_rng([seed, 7])

@@ -23,33 +23,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-HERE = Path(__file__).resolve().parent
-SHARED = HERE.parents[1] / "shared" / "models"
+from runs import HERE, MODELS, SHARED
+
 PLOT = HERE.parent / "docs" / "pictures" / "energy-over-time.svg"
-#: name: (source, template)
-MODELS: dict[str, tuple[str, str]] = {
-    "sample car": ("sample:car", "box-3x4x4"),
-    "sample duck": ("sample:duck", "box-4x4x4"),
-    "sample rabbit": ("sample:rabbit", "box-4x4x4"),
-    "sample elephant": ("sample:elephant", "box-4x4x4"),
-    "sample locomotive": ("sample:locomotive", "box-4x4x4"),
-    "bunny": ("paper/bunny.stl", "box-4x4x4"),
-    "kitten": ("paper/kitten.stl", "box-4x4x4"),
-    "dragon": ("paper/dragon.stl", "box-4x4x4"),
-    "car": ("paper/car.stl", "box-3x4x4"),
-    "elephant": ("paper/elephant.stl", "box-5x5x5"),
-    "u-car": ("paper/car.stl", "u-112"),
-    "airplane": ("dev/airplane.ply", "box-4x4x4"),
-    "bicycle": ("dev/bicycle.stl", "box-4x4x4"),
-    "double_torus": ("dev/double_torus.off", "box-4x4x4"),
-    "featuretype": ("dev/featuretype.step", "box-4x4x4"),
-    "idler_riser": ("dev/idler_riser.stl", "box-4x4x4"),
-    "knight": ("dev/knight.stl", "box-4x4x4"),
-    "locomotive": ("dev/locomotive.stl", "box-4x4x4"),
-    "office_chair": ("dev/office_chair.stl", "box-4x4x4"),
-    "spot": ("dev/spot.obj", "box-4x4x4"),
-    "trex": ("dev/trex.stl", "box-4x4x4"),
-}
 #: Seconds at which the plot and the table look at the best tree so far.
 MARKS = (5, 10, 20, 40, 80, 160)
 
@@ -267,13 +243,12 @@ def main() -> int:
     kept, old = HERE / "energies.json", HERE / "energies_before.json"
     rows = json.loads(kept.read_text("utf-8")) if kept.is_file() else {}
     before = json.loads(old.read_text("utf-8")) if old.is_file() else {}
-    for name, (source, template) in MODELS.items():
+    for name, model in MODELS.items():
         key = _key(name, options.effort, options.seed)
-        path = source if source.startswith("sample:") else str(options.models / source)
-        here = source.startswith("sample:") or Path(path).is_file()
-        if not here or (name not in options.names if options.names else key in rows):
+        source = model.where(options.models)
+        if source is None or (name not in options.names if options.names else key in rows):
             continue
-        call = [sys.executable, __file__, "--one", path, template]
+        call = [sys.executable, __file__, "--one", source, model.template]
         call += [
             "--effort",
             options.effort,

@@ -90,6 +90,7 @@ def section(name: str, options: dict[str, str], told: dict[str, Any]) -> list[st
     """A kit's part of the page."""
     title = sample(options["model"].removeprefix("sample:")).title
     good, every = told["checks_passed"]
+    hinges = told["joints"]["S"] + 2 * told["joints"]["D"]
     size = f"{told['volume_mm3'] / 1000:.0f} cm³"
     way = f"Printed in place with `{told['profile']}`, {size}"
     if told["print"] == "apart":
@@ -105,7 +106,7 @@ def section(name: str, options: dict[str, str], told: dict[str, Any]) -> list[st
         f"## {name}",
         "",
         f"{title[0].upper()}{title[1:]}: {told['voxels']} voxels, {told['bodies']} bodies, "
-        f"{told['joints']['S']} hinges, folds into {told['template']} in {told['moves']} moves.",
+        f"{hinges} hinges, folds into {told['template']} in {told['moves']} moves.",
         f"{way}. Smallest gap on the path {told['min_gap_mm']:.3f} mm, {good} of {every} checks "
         "passed.",
         "",

@@ -23,7 +23,6 @@ import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -55,9 +54,10 @@ def do_solid(model: str, folder: Path) -> None:
 
 
 def do_voxelize(side: int, seed: int, folder: Path) -> None:
-    from fabfold.kit.stage_files import load_solid, save_options
+    from fabfold.kit.stage_files import load_solid
     from fabfold.lattice.shipped import load_template
     from fabfold.store import StageStore
+    from fabfold.voxels.voxel_files import save_voxels
     from fabfold.voxels.voxelize import voxelize
 
     solid = load_solid(StageStore(folder), ["solid.npz"])
@@ -65,7 +65,9 @@ def do_voxelize(side: int, seed: int, folder: Path) -> None:
     start = time.process_time()
     options = voxelize(solid, load_template(name_of(side)), seed=seed)
     seconds = time.process_time() - start
-    files = save_options(StageStore(folder / str(side)), options)
+    files = [f"voxels-{side}-{index}.npz" for index in range(len(options))]
+    for name, voxels in zip(files, options, strict=True):
+        save_voxels(folder / name, voxels)
     say(
         seconds=round(seconds, 2),
         voxels=[len(voxels) for voxels in options],
@@ -109,47 +111,44 @@ def do_tree(
 ) -> None:
     """The product's seeds, one after the other, until one folds."""
     from fabfold.kit.kit import Kit
-    from fabfold.kit.stage_files import load_options
     from fabfold.search.seeds import Job, run_seed
     from fabfold.search.warmup import warm_up_job
-    from fabfold.store import StageStore
     from fabfold.tree.initial_poses import grow
+    from fabfold.voxels.voxel_files import load_voxels
 
     kit = Kit.from_model(model, template=name_of(side), seed=seed)
-    options = load_options(StageStore(folder / str(side)), files)
+    options = [load_voxels(folder / name) for name in files]
     rounds = runs.rounds_of(kit, kit.recipe, options)
     run_seed(warm_up_job(), 0, lambda _: None, lambda: False)
     notes: dict[str, Any] = {}
-    first = rounds._seeds(0)[0]
     found: list[Any] = []
     clock = runs.Recorder(budget)
 
     def stop() -> bool:
         return bool(found) or clock.over()
 
-    for number in count(first):
-        job = rounds.job(number)
+    for tried, (turn, job) in enumerate(runs.jobs_of(rounds)):
         if stop():
             break
         if not isinstance(job, Job):
-            if number - first >= len(options) and "grown" not in notes:
+            if tried >= len(options) and "grown" not in notes:
                 say(error=job.why)
                 return
             continue
-        if "grown" not in notes and next(grow(job.problem, number), None) is not None:
+        if "grown" not in notes and next(grow(job.problem, turn), None) is not None:
             notes["grown"] = round(clock.cpu, 2)
             say(**notes)
             clock = runs.Recorder(budget)
-        job = replace(job, foldability=Watched(job.foldability, notes, clock))
-        ended = run_seed(job, number, found.append, stop)
+        watched = replace(job, foldability=Watched(job.foldability, notes, clock))
+        ended = run_seed(watched, turn, found.append, stop)
         if ended.failed:
             raise SystemExit(ended.why)
         if found:
             notes["folds"] = round(clock.cpu, 2)
-            notes["joined"] = len(rounds.voxels(number))
+            notes["joined"] = len(rounds.voxels(turn))
             notes["hinges"] = len(found[0].tree.hinges)
             notes["moves"] = len(found[0].path)
-        notes["seeds"] = number - first + 1
+        notes["seeds"] = tried + 1
         say(**notes)
 
 

@@ -29,10 +29,10 @@ from runs import HERE
 
 @cache
 def car_problem() -> Any:
-    """The paper's car, its roomiest voxelization, with its printable joints."""
-    kit = runs.voxelized(runs.MODELS["car"], Path(os.environ["KERNELS_WORK"]) / "car")
+    """The sample's car, its roomiest voxelization, with single hinges."""
+    kit = runs.voxelized(runs.MODELS["sample car"], Path(os.environ["KERNELS_WORK"]) / "car")
     rounds = runs.rounds_of(kit, runs.recipe_of(kit, 1, "S"))
-    return rounds.job(rounds._seeds(0)[0]).problem
+    return next(job for _, job in runs.jobs_of(rounds)).problem
 
 
 def digest(*values: Any) -> str:

@@ -1,9 +1,4 @@
-"""Timed runs of the search and proofs of what they found; shared by the benchmarks beside it.
-
-Every run is a process of one core. It goes through the product's own rounds of seeds, writes down
-when each better folding tree came, and keeps the trees, so that they can be built and proven
-afterwards. A run is one JSON file; what is there is not run again.
-"""
+"""Models, the machine, and the search's own seeds; shared by the benchmarks beside it."""
 
 from __future__ import annotations
 
@@ -14,58 +9,65 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import metadata
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
 SHARED = HERE.parents[1] / "shared" / "models"
-#: Trees that a run keeps: the first ones and the last ones.
-FIRST, LAST = 4, 8
-#: Candidates that are tried before a run counts as not certified.
-TRIES = 4
 #: Seconds of the clock, for each second of the processor, after which a run ends anyway.
 PATIENCE = 4.0
 
 
 @dataclass(frozen=True)
 class Model:
-    """One row of the table."""
+    """A model and the box that it is to become.
 
-    source: Path
+    Attributes
+    ----------
+    source : str
+        ``sample:NAME``, or a file below the folder of models.
+    template : str
+        Name of the box.
+    """
+
+    source: str
     template: str
-    paper_joints: int | None = None
-    paper_hours: int | None = None
-    aim_joints: int | None = None
-    aim_seconds: float | None = None
+
+    def where(self, folder: Path = SHARED) -> str | None:
+        """What fabfold takes as the model; None where there is no such file."""
+        if self.source.startswith("sample:"):
+            return self.source
+        path = folder / self.source
+        return str(path) if path.is_file() else None
 
 
-PAPER = {
-    "bunny": Model(SHARED / "paper/bunny.stl", "box-4x4x4", 29, 245, 19, 5),
-    "kitten": Model(SHARED / "paper/kitten.stl", "box-4x4x4", 34, 345, 22, 5),
-    "dragon": Model(SHARED / "paper/dragon.stl", "box-4x4x4", 32, 215, 21, 5),
-    "car": Model(SHARED / "paper/car.stl", "box-3x4x4", 22, 161, 14, 5),
-    "elephant": Model(SHARED / "paper/elephant.stl", "box-5x5x5", 62, 1005, 41, 60),
-    "u-car": Model(SHARED / "paper/car.stl", "u-112", 45, 805, 30, 60),
+MODELS = {
+    "sample car": Model("sample:car", "box-3x4x4"),
+    "sample duck": Model("sample:duck", "box-4x4x4"),
+    "sample rabbit": Model("sample:rabbit", "box-4x4x4"),
+    "sample elephant": Model("sample:elephant", "box-4x4x4"),
+    "sample locomotive": Model("sample:locomotive", "box-4x4x4"),
+    "bunny": Model("paper/bunny.stl", "box-4x4x4"),
+    "kitten": Model("paper/kitten.stl", "box-4x4x4"),
+    "dragon": Model("paper/dragon.stl", "box-4x4x4"),
+    "car": Model("paper/car.stl", "box-3x4x4"),
+    "elephant": Model("paper/elephant.stl", "box-5x5x5"),
+    "u-car": Model("paper/car.stl", "u-112"),
+    "airplane": Model("dev/airplane.ply", "box-4x4x4"),
+    "bicycle": Model("dev/bicycle.stl", "box-4x4x4"),
+    "double_torus": Model("dev/double_torus.off", "box-4x4x4"),
+    "featuretype": Model("dev/featuretype.step", "box-4x4x4"),
+    "idler_riser": Model("dev/idler_riser.stl", "box-4x4x4"),
+    "knight": Model("dev/knight.stl", "box-4x4x4"),
+    "locomotive": Model("dev/locomotive.stl", "box-4x4x4"),
+    "office_chair": Model("dev/office_chair.stl", "box-4x4x4"),
+    "spot": Model("dev/spot.obj", "box-4x4x4"),
+    "trex": Model("dev/trex.stl", "box-4x4x4"),
 }
-DEV = {
-    path.partition(".")[0]: Model(SHARED / "dev" / path, "box-4x4x4")
-    for path in (
-        "airplane.ply",
-        "bicycle.stl",
-        "double_torus.off",
-        "featuretype.step",
-        "idler_riser.stl",
-        "knight.stl",
-        "locomotive.stl",
-        "office_chair.stl",
-        "spot.obj",
-        "trex.stl",
-    )
-}
-MODELS = PAPER | DEV
 
 
 def machine() -> dict[str, Any]:
@@ -142,8 +144,11 @@ def voxelized(model: Model, folder: Path, **options: Any) -> Any:
     """Kit of a model, with its voxelizations made once and kept in `folder`."""
     from fabfold.kit.kit import Kit
 
+    source = model.where()
+    if source is None:
+        raise SystemExit(f"{SHARED / model.source}: no such file")
     kit = Kit.from_model(
-        model.source, template=model.template, folder=folder, workers=1, seed=1, **options
+        source, template=model.template, folder=folder, workers=1, seed=1, **options
     )
     start = time.process_time()
     kit.voxelize()
@@ -176,6 +181,13 @@ def rounds_of(kit: Any, recipe: Any, options: Sequence[Any] | None = None) -> An
         workers=1,
         open_progress=SilentListener().stage,
     )
+
+
+def jobs_of(rounds: Any) -> Iterator[tuple[int, Any]]:
+    """Seeds of round after round and what each searches: those that need no other's result."""
+    for number in count():
+        for seed in sorted(rounds.batch(number).keys):
+            yield seed, rounds.job(number, seed)
 
 
 def warm_up(job: Any, joints: Any) -> float:
@@ -213,9 +225,7 @@ class Recorder:
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
         self.events: list[dict[str, Any]] = []
-        self.trees: dict[int, dict[str, Any]] = {}
         self.best = float("inf")
-        self.option = 0
         self._cpu, self._wall = time.process_time(), time.perf_counter()
 
     @property
@@ -238,7 +248,6 @@ class Recorder:
         if energy["total"] >= self.best - 1e-9:
             return
         self.best = energy["total"]
-        number = len(self.events)
         self.events.append(
             {
                 "cpu": round(self.cpu, 3),
@@ -251,157 +260,3 @@ class Recorder:
                 "seed": candidate.seed,
             }
         )
-        self.trees[number] = {
-            "option": self.option,
-            "tree": candidate.tree.to_json(1.0, (0.0, 0.0, 0.0)),
-            "path": candidate.path.tolist(),
-        }
-        if number >= FIRST + LAST:
-            self.trees.pop(number - LAST, None)
-
-
-def timed_run(
-    model: Model,
-    folder: Path,
-    seed: int,
-    joints: str | None,
-    seconds: float,
-    change: Callable[[Any], Any] | None = None,
-) -> dict[str, Any]:
-    """Search for so many processor seconds, round after round, as the product does.
-
-    Parameters
-    ----------
-    model : Model
-    folder : Path
-        Keeps the voxelizations.
-    seed : int
-        Of the recipe.
-    joints : str or None
-        ``"S"`` or ``"S+D"``; None for the default.
-    seconds : float
-    change : callable, optional
-        Changes each job, for the ablation.
-    """
-    from fabfold.errors import FabfoldError
-    from fabfold.search.seeds import Job, run_seed
-
-    facts: dict[str, Any] = {"seed": seed, "joints": joints, "seconds": seconds}
-    try:
-        kit = voxelized(model, folder)
-        rounds = rounds_of(kit, recipe_of(kit, seed, joints))
-        first = rounds.job(rounds._seeds(0)[0])
-        if not isinstance(first, Job):
-            return {**facts, "error": first.why, "events": [], "trees": {}}
-        facts["kernels"] = warm_up(first, rounds.recipe.joints)
-    except FabfoldError as error:
-        return {**facts, "error": str(error), "events": [], "trees": {}}
-    rounds = rounds_of(kit, rounds.recipe)  # the making of the jobs counts
-    clock = Recorder(seconds)
-    ended = []
-    number = 0
-    while not clock.over():
-        for search_seed in rounds._seeds(number):
-            if clock.over():
-                break
-            clock.option = rounds._option(search_seed)
-            job = rounds.job(search_seed)
-            if isinstance(job, Job):
-                job = job if change is None else change(job)
-                result = run_seed(job, search_seed, clock.report, clock.over)
-            else:
-                result = job
-            if result.failed:
-                raise SystemExit(result.why)
-            why = "" if result.candidates else result.why
-            ended.append([search_seed, clock.option, round(clock.cpu, 2), why])
-        number += 1
-    return {
-        **facts,
-        "template": model.template,
-        "voxels": [len(voxels) for voxels in rounds.options],
-        "cells": len(rounds.template),
-        "cpu": clock.cpu,
-        "wall": clock.wall,
-        "ended": ended,
-        "events": clock.events,
-        "trees": clock.trees,
-    }
-
-
-def proven(
-    model: Model,
-    folder: Path,
-    run: dict[str, Any],
-    wanted: Sequence[str],
-    gap_step_deg: float,
-    before: dict[str, Any] | None = None,
-) -> dict[str, Any]:
-    """Build, certify and sample the first and the best tree of a run, or one of them.
-
-    Where a tree is refused, the next one takes its place: the next later one for the first, the
-    next worse one for the best. `before` is what was proven of this run already.
-    """
-    kit = voxelized(model, folder)
-    rounds = rounds_of(kit, recipe_of(kit, run["seed"], run["joints"]))
-    out = {**(before or {"tried": {}})}
-    known = out["tried"]
-
-    def holds(number: str) -> bool:
-        if number not in known:
-            known[number] = _prove(kit, rounds, run, number, gap_step_deg)
-        return bool(known[number]["ok"])
-
-    numbers = sorted(run["trees"], key=int)
-    for what in wanted:
-        order = numbers if what == "first" else numbers[::-1]
-        good = (int(number) for number in order[:TRIES] if holds(number))
-        out[what] = next(good, None)
-    return out
-
-
-def _prove(
-    kit: Any, rounds: Any, run: dict[str, Any], number: str, gap_step_deg: float
-) -> dict[str, Any]:
-    import numpy as np
-
-    from fabfold.errors import CheckError, GeometryError
-    from fabfold.fold.motion import motion_of
-    from fabfold.kit.stages import PlannedTree, build
-    from fabfold.progress import SilentProgress
-    from fabfold.proof.sampled import sample_path
-    from fabfold.tree.fold_tree import FoldTree
-    from fabfold.tree.kinematics_check import check_tree
-
-    entry = run["trees"][number]
-    tree = FoldTree.from_json(entry["tree"])
-    path = np.array(entry["path"], dtype=np.int32).reshape(-1, 2)
-    start = time.process_time()
-    faults = check_tree(tree)
-    if faults:
-        return {"ok": False, "why": f"tree: {faults[0]}"}
-    planned = PlannedTree(rounds.options[entry["option"]], tree, motion_of(tree, path))
-    try:
-        made = build(planned, kit.print_mode(), kit.recipe.voxel_mm, (), SilentProgress())
-    except (GeometryError, CheckError) as error:
-        return {"ok": False, "why": str(error), "seconds": time.process_time() - start}
-    certified = time.process_time()
-    joinery, motion = made.joinery, made.planned.motion
-    seen = sample_path(
-        made.planned.tree.to_json(joinery.voxel_mm, joinery.origin_mm),
-        motion.to_json(),
-        {body.name: (body.vertices, body.faces) for body in joinery.bodies},
-        gap_step_deg=gap_step_deg,
-    )
-    return {
-        "ok": seen.ok and seen.overlap_mm3 < 1e-3,
-        "why": "; ".join(seen.hits[:2]),
-        "seconds": certified - start,
-        "proven_mm": motion.certificate["min_gap_mm"],
-        "sampled_mm": seen.least_mm,
-        "poses": seen.poses,
-        "bodies": len(joinery.bodies),
-        "triangles": sum(len(body.faces) for body in joinery.bodies),
-        "carved_cells": joinery.carved_cells,
-        "sampled_seconds": time.process_time() - certified,
-    }

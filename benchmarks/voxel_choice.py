@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from energies import MODELS, SHARED
+from runs import MODELS, SHARED
 
 from fabfold.kit.box_closure import closing_rate, open_faces
 from fabfold.kit.kit import Kit
@@ -52,9 +52,10 @@ REASONS = (
 
 def kit_of(name: str, models: Path) -> Kit:
     """The kit of a named model, nothing made yet; single hinges, which trees are searched with."""
-    source, template = MODELS[name]
-    path = source if source.startswith("sample:") else str(models / source)
-    return Kit.from_model(path, template=template, joints="S", workers=1)
+    model = MODELS[name]
+    source = model.where(models)
+    assert source is not None
+    return Kit.from_model(source, template=model.template, joints="S", workers=1)
 
 
 def known(voxels: Any, kit: Kit) -> dict[str, float]:
@@ -210,8 +211,7 @@ def main() -> None:
     rows = json.loads(KEPT.read_text("utf-8")) if KEPT.is_file() else {}
     choice = []
     for name in names:
-        source = MODELS[name][0]
-        if not source.startswith("sample:") and not (options.models / source).is_file():
+        if MODELS[name].where(options.models) is None:
             continue
         if options.trees:
             rows[name] = trees_of(name, options.models)
