@@ -16,6 +16,7 @@ import argparse
 import json
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -149,6 +150,7 @@ def main() -> int:
     data = options.out.with_suffix(".json")
     kept = json.loads(data.read_text("utf-8")) if data.is_file() else {"rows": {}}
     rows: dict[str, dict[str, Any]] = kept["rows"]
+    lock = threading.Lock()
 
     def run(job: tuple[str, str, str, int]) -> None:
         name, source, template, seed = job
@@ -159,13 +161,13 @@ def main() -> int:
             text=True,
             check=False,
         )
-        if done.returncode:
-            print(f"{name}, seed {seed}: {done.stderr[-500:]}", file=sys.stderr)
-            return
-        row = json.loads(done.stdout)
+        row = {"error": f"crashed: {' '.join(done.stderr[-500:].split())}", "seconds": {}}
+        if done.returncode == 0:
+            row = json.loads(done.stdout)
         print(f"{name}, seed {seed}: {state_of(row) or 'a kit'}", flush=True)
-        rows.setdefault(name, {})[str(seed)] = row
-        write(data, {"facts": {**machine(), "effort": options.effort}, "rows": rows})
+        with lock:
+            rows.setdefault(name, {})[str(seed)] = row
+            write(data, {"facts": {**machine(), "effort": options.effort}, "rows": rows})
 
     jobs = []
     for name, model in MODELS.items():
@@ -176,6 +178,8 @@ def main() -> int:
                 jobs.append((name, str(source), model.template, seed))
     with ThreadPoolExecutor(options.workers) as pool:
         list(pool.map(run, jobs))
+    if not rows:
+        parser.error(f"no such models in {options.models}")
     kept = json.loads(data.read_text("utf-8"))
     options.out.write_text(table(kept["rows"], kept["facts"]), encoding="utf-8")
     return 0
