@@ -125,10 +125,9 @@ def table(rows: dict[str, dict[str, Any]], facts: dict[str, Any]) -> str:
         for name, mine in rows.items()
         for row in mine.values()
         for note in row.get("notes", [])
-        if "thick" in note
     }
     if notes:
-        lines += ["", "## Thickened", "", *sorted(notes)]
+        lines += ["", "## What was done to models", "", *sorted(notes)]
     return "\n".join(lines) + "\n"
 
 

@@ -291,7 +291,7 @@ def test_thinned_keeps_the_rest_and_the_shape():
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.05, 0.2])
 def test_thinned_stays_within_its_bound(tolerance):
-    # A thin plate on a ball: few triangles change the volume little and the shape much.
+    # A ball in a thin disc: few triangles change the volume little and the shape much.
     shape = m3.Manifold.sphere(10, 96) + m3.Manifold.cylinder(0.6, 14, 13.5, 96, True)
     vertices, faces = _mesh(shape)
     points, triangles = thinned(vertices, faces, np.ones(len(faces), dtype=bool), tolerance)

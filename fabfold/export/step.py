@@ -172,8 +172,8 @@ def write_step(
     if colours is None:
         colours = palette(len(joinery.bodies)) if tree is None else body_colours(tree)
     # Without the tree nothing tells barrels from sculpted surfaces, so nothing is thinned.
-    thin_mm = min(THIN_SHARE * joinery.voxel_mm, THIN_CLEARANCE * joinery.clearance_mm)
-    thin_mm = thin_mm if tree is not None else 0.0
+    bound_mm = min(THIN_SHARE * joinery.voxel_mm, THIN_CLEARANCE * joinery.clearance_mm)
+    thin_mm = bound_mm if tree is not None else 0.0
     axes = barrel_axes(joinery, tree) if tree is not None else [[] for _ in joinery.bodies]
     application = f"fabfold {__version__}"
     solids, plain, volume = [], [], 0.0
