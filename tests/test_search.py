@@ -16,6 +16,7 @@ from tree_cases import solid_problem, strip
 
 from fabfold.errors import NoTreeError, RecipeError, WorkerError
 from fabfold.fold.lattice_foldability import LatticeFoldability
+from fabfold.search import processes
 from fabfold.search.processes import ProcessExecutor
 from fabfold.search.run import executor, run_seeds, search
 from fabfold.search.seeds import Job, SeedResult
@@ -101,6 +102,32 @@ def test_a_killed_worker_costs_nothing(problem, alone, tmp_path):
     found = search(problem, range(4), judge, EFFORT, workers=2)
     assert len(list(tmp_path.iterdir())) == 1
     assert key(found) == key(alone)
+
+
+def test_workers_that_still_load_kernels_are_ended_and_not_waited_for(monkeypatch):
+    ended = []
+    monkeypatch.setattr(processes, "_end", ended.append)
+    pool = ProcessExecutor(2)
+    pool.stand_by("S")
+    pool.close()
+    (forking,) = [process for process in ended if process is not None]
+    forking.join(60)
+    assert forking.exitcode == -signal.SIGTERM
+
+
+@pytest.mark.slow
+def test_a_killed_worker_that_stood_by_costs_nothing(problem, alone, tmp_path):
+    heard = Results()
+    job = Job(problem, Deadly(tmp_path, deaths=1), EFFORT)
+    pool = ProcessExecutor(2)
+    pool.stand_by("S")
+    assert len(multiprocessing.active_children()) == 1, "they are forked from one"
+    with closing(pool):
+        run_seeds(pool, ((seed, job) for seed in range(4)), heard.on_event, lambda: False)
+    assert len(list(tmp_path.iterdir())) == 1
+    found = [c for seed in range(4) for c in heard.done[seed].candidates]
+    assert key(sorted(found, key=lambda c: c.energy["total"])) == key(alone)
+    assert multiprocessing.active_children() == []
 
 
 @pytest.mark.slow

@@ -14,6 +14,8 @@ import zipfile
 import zlib
 from html import escape
 from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,7 +44,7 @@ def three_js() -> str:
         If this trimesh brings none.
     """
     try:
-        packed = files("trimesh").joinpath("resources/templates/viewer.zip").read_bytes()
+        packed = (_trimesh_folder() / "resources/templates/viewer.zip").read_bytes()
         with zipfile.ZipFile(io.BytesIO(packed)) as archive:
             page = archive.read(archive.namelist()[0]).decode("utf-8")
     except (OSError, zipfile.BadZipFile, UnicodeDecodeError) as error:
@@ -54,6 +56,14 @@ def three_js() -> str:
     if found is None:
         raise GeometryError("fold.html: this version of trimesh brings no three.js; install 4.5")
     return found[1]
+
+
+def _trimesh_folder() -> Path:
+    """Where trimesh is installed; found without loading it, which takes half a second."""
+    spec = find_spec("trimesh")
+    if spec is None or spec.origin is None:
+        raise FileNotFoundError("trimesh is not installed")
+    return Path(spec.origin).parent
 
 
 def _aligned(array: NDArray[Any]) -> bytes:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from typing import Any
 
 from fabfold.child_process import end_with_parent, safe_path
 from fabfold.search.seeds import Better, Done, Event, Job, Lost, run_seed
@@ -20,6 +22,7 @@ from fabfold.tree.catalogue import JointSet
 
 __all__ = ["InProcessExecutor", "ProcessExecutor"]
 
+_SPAWN = multiprocessing.get_context("spawn")
 #: Seconds that a worker has to end by itself before it is killed.
 PATIENCE = 5.0
 #: Seconds that a worker on standby waits for its first seed before it ends.
@@ -69,16 +72,19 @@ class InProcessExecutor:
 
 @dataclass
 class _Worker:
-    process: BaseProcess
     connection: Connection
+    #: None for one that was forked: it ends with its pipe, or with the process that forked it.
+    process: BaseProcess | None
     seed: int | None = None
 
 
 class ProcessExecutor:
     """Runs seeds in worker processes on this machine, each started when it is first needed.
 
-    Every worker has a pipe of its own. So a worker that dies, for whatever reason, tells by its
-    pipe which seed it had, and the others do not notice; and workers whose parent dies end too.
+    Those on standby are forked from one process that has loaded the kernels, where the system can
+    do so: loading takes as long as a seed of a small model. Every worker has a pipe of its own. So
+    a worker that dies, for whatever reason, tells by its pipe which seed it had, and the others do
+    not notice; and workers whose parent dies end too.
 
     Parameters
     ----------
@@ -89,6 +95,8 @@ class ProcessExecutor:
     def __init__(self, count: int) -> None:
         self._count = count
         self._workers: list[_Worker] = []
+        self._forking: BaseProcess | None = None
+        self._has_run = False
 
     def stand_by(self, joints: JointSet, seconds: float = STANDBY) -> None:
         """Start all workers now, so that they have loaded the kernels when there are seeds.
@@ -100,8 +108,15 @@ class ProcessExecutor:
         seconds : float
             Those that get no seed for so long end by themselves.
         """
-        while len(self._workers) < self._count:
-            self._start((joints, seconds))
+        if sys.platform != "linux":  # Elsewhere those that are forked would not end with this one.
+            while len(self._workers) < self._count:
+                self._start((joints, seconds))
+            return
+        pipes = [_SPAWN.Pipe() for _ in range(self._count - len(self._workers))]
+        self._forking = _started(_fork_workers, [theirs for _, theirs in pipes], joints, seconds)
+        for ours, theirs in pipes:
+            theirs.close()
+            self._workers.append(_Worker(ours, None))
 
     def free(self) -> int:
         """Seeds that can be taken now."""
@@ -120,18 +135,14 @@ class ProcessExecutor:
                     raise
                 continue
             worker.seed = seed
+            self._has_run = True
             return
 
     def _start(self, standby: tuple[JointSet, float] | None = None) -> _Worker:
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(
-            target=_serve, args=(theirs, standby), name="fabfold-seed", daemon=True
-        )
-        with _stops_held(), safe_path():
-            process.start()
+        ours, theirs = _SPAWN.Pipe()
+        process = _started(_serve, theirs, standby)
         theirs.close()
-        worker = _Worker(process, ours)
+        worker = _Worker(ours, process)
         self._workers.append(worker)
         return worker
 
@@ -166,6 +177,13 @@ class ProcessExecutor:
             if last is not None:
                 on_event(last)
 
+    def _are_idle(self) -> bool:
+        """Whether workers have run seeds, and none runs one: they end at once by themselves.
+
+        One that has run none may still be loading the kernels.
+        """
+        return self._has_run and all(worker.seed is None for worker in self._workers)
+
     def stop(self) -> None:
         """Ask the seeds that run to end early with what they have."""
         for worker in self._workers:
@@ -179,13 +197,26 @@ class ProcessExecutor:
         """End all workers at once: none has anything left that is wanted."""
         for worker in self._workers:
             worker.connection.close()
-            worker.process.terminate()
-        for worker in self._workers:
-            _end(worker.process)
+            if worker.process is not None:
+                worker.process.terminate()
+        if self._forking is not None and not self._are_idle():
+            self._forking.terminate()  # And its children, in the middle of what they do.
+        for process in (*(worker.process for worker in self._workers), self._forking):
+            _end(process)
         self._workers.clear()
+        self._forking = None
 
 
-def _end(process: BaseProcess) -> None:
+def _started(target: Callable[..., None], *arguments: Any) -> BaseProcess:
+    process = _SPAWN.Process(target=target, args=arguments, name="fabfold-seed", daemon=True)
+    with _stops_held(), safe_path():
+        process.start()
+    return process
+
+
+def _end(process: BaseProcess | None) -> None:
+    if process is None:
+        return
     process.join(PATIENCE)
     if process.is_alive():
         process.kill()
@@ -221,18 +252,51 @@ def _stops_held() -> Iterator[None]:
             signal.raise_signal(asked[0])
 
 
-def _serve(connection: Connection, standby: tuple[JointSet, float] | None) -> None:
-    """Run seeds as they come, until the parent closes the pipe or is gone."""
+def _begin() -> None:
+    """Leave Ctrl-C to the process that started this one, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     caller = multiprocessing.parent_process()
     end_with_parent(None if caller is None else caller.pid)
+
+
+def _warm_up(joints: JointSet) -> None:
+    run_seed(warm_up_job(joints), 1, lambda _: None, lambda: False)
+
+
+def _fork_workers(connections: Sequence[Connection], joints: JointSet, seconds: float) -> None:
+    """Load the kernels, become a worker for each connection, and wait until all of them ended."""
+    _begin()
+    _warm_up(joints)
+    parent = os.getpid()
+    for connection in connections:
+        if os.fork() == 0:
+            end_with_parent(parent)
+            for other in connections:
+                if other is not connection:
+                    other.close()
+            if connection.poll(seconds):
+                _run_seeds(connection)
+            os._exit(0)
+    for connection in connections:
+        connection.close()
+    with suppress(ChildProcessError):
+        while True:
+            os.wait()
+
+
+def _serve(connection: Connection, standby: tuple[JointSet, float] | None) -> None:
+    """Run seeds as they come, until the parent closes the pipe or is gone."""
+    _begin()
     if standby is not None:
         joints, seconds = standby
-        run_seed(warm_up_job(joints), 1, lambda _: None, lambda: False)
+        _warm_up(joints)
         if not connection.poll(seconds):
             return
+    _run_seeds(connection)
 
+
+def _run_seeds(connection: Connection) -> None:
     def stop() -> bool:
         if not connection.poll():
             return False
