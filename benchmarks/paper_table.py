@@ -1,11 +1,13 @@
 """The paper's models and the samples, end to end: writes benchmarks/paper_table.md.
 
     python benchmarks/paper_table.py [NAME ...] [--models DIR] [--kits DIR] [--verify verify_kit.py]
+                                     [--before]
 
 Each model runs in a fresh process with an empty kit folder, on the command line's defaults.
 Processor seconds are those that each stage has cost, with the processes that it started; STEP is
 written beside the checks, and is counted where it ends. Memory is the largest process.
-Without names every model is run; with names only those rows are measured again.
+Without names every model is run; with names only those rows are measured again. With `--before`
+version 0.1, taken from the repository's history, makes each kit too, right after this version.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ import resource
 import shutil
 import subprocess
 import sys
+import tarfile
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -33,6 +37,16 @@ MODELS: dict[str, tuple[str, str, int | None, int | None]] = {
     "car": ("car.stl", "box-3x4x4", 22, 161),
     "elephant": ("elephant.stl", "box-5x5x5", 62, 1005),
 }
+#: The last commit of version 0.1.
+BEFORE = "0a770bb"
+#: Runs the command line of the version that is found first.
+_EXPORT = """
+import sys
+if __name__ == "__main__":
+    from fabfold.cli.app import main
+    sys.argv = ["fabfold", "export", sys.argv[1], "--template", sys.argv[2], "-o", sys.argv[3]]
+    main()
+"""
 STAGES = ("solid", "voxelize", "fit", "fold", "join", "check", "export")
 
 
@@ -81,6 +95,91 @@ def run_one(source: str, template: str, kit_folder: Path) -> dict[str, Any]:
     ]
     row["peak_mib"] = max(usage) / 1024
     return row
+
+
+class Before:
+    """Version 0.1, unpacked from the repository's history, its kernels compiled.
+
+    Parameters
+    ----------
+    folder : Path
+        Where it is unpacked.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        packed = folder / "before.tar"
+        command = ["git", "-C", str(HERE.parent), "archive", "-o", str(packed), BEFORE]
+        if subprocess.run(command, check=False).returncode:
+            sys.exit(f"--before needs the repository with its history, for commit {BEFORE} of it")
+        with tarfile.open(packed) as archive:
+            archive.extractall(folder / "code", filter="data")
+        (folder / "export.py").write_text(_EXPORT, encoding="utf-8")
+        self.row("sample:car", "box-3x4x4")  # It compiles its kernels.
+
+    def row(self, source: str, template: str) -> dict[str, Any]:
+        """Make a kit and return its seconds and what its report says."""
+        kit = self._folder / "kit"
+        shutil.rmtree(kit, ignore_errors=True)
+        spent, start = _children_seconds(), time.perf_counter()
+        done = subprocess.run(
+            [sys.executable, str(self._folder / "export.py"), source, template, str(kit)],
+            capture_output=True,
+            check=False,
+            env={
+                **os.environ,
+                "PYTHONPATH": str(self._folder / "code"),
+                "NUMBA_CACHE_DIR": str(self._folder / "kernels"),
+            },
+        )
+        row: dict[str, Any] = {
+            "exit": done.returncode,
+            "cpu": _children_seconds() - spent,
+            "total": time.perf_counter() - start,
+        }
+        report = kit / "report.json"
+        if report.is_file():
+            row["summary"] = json.loads(report.read_text(encoding="utf-8"))["summary"]
+        return row
+
+
+def _children_seconds() -> float:
+    """Processor seconds of processes that have ended and were waited for."""
+    spent = os.times()
+    return spent.children_user + spent.children_system
+
+
+def before_table(rows: dict[str, dict[str, Any]]) -> list[str]:
+    """Lines of Markdown of those rows that version 0.1 made too."""
+    both = {name: row for name, row in rows.items() if "before" in row}
+    if not both:
+        return []
+    lines = [
+        "",
+        "This version and 0.1 one after the other on the same machine: processor seconds of the",
+        "whole program, their ratio, and the clock. *Hinges* counts the axes. 0.1 writes no manual",
+        "and no page that plays, and makes fewer checks.",
+        "",
+        "| model | all | 0.1 | ratio | clock | 0.1 | energy | 0.1 | hinges | 0.1 |",
+        "|---|" + "--:|" * 9,
+    ]
+    for name, row in both.items():
+        old = row["before"]
+        new, was = row["cpu"], old["cpu"]
+        cells = [f"{new:.1f}", f"{was:.1f}", f"{new / was:.2f}"]
+        cells += [f"{row['total']:.1f}", f"{old['total']:.1f}"]
+        sides = [_facts(row), _facts(old)]
+        cells += [side[0] for side in sides] + [side[1] for side in sides]
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def _facts(row: dict[str, Any]) -> tuple[str, str]:
+    """Energy and number of hinges of a row; where it has none, how it ended."""
+    if "summary" not in row:
+        return f"exit {row['exit']}", "–"
+    made = row["summary"]["joints"]
+    return f"{row['summary']['energy']['total']:.2f}", str(made["S"] + 2 * made["D"])
 
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
@@ -133,7 +232,7 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
             f" {row['first'] or 0.0:.1f} | {row['total']:.1f} | {row['peak_mib']:.0f} |"
             f" {hours or '–'} |"
         )
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *before_table(rows)]) + "\n"
 
 
 def main() -> None:
@@ -142,6 +241,7 @@ def main() -> None:
     parser.add_argument("--models", type=Path, default=SHARED / "models" / "paper")
     parser.add_argument("--kits", type=Path, default=Path("paper-kits"))
     parser.add_argument("--verify", type=Path, default=SHARED / "tools" / "verify_kit.py")
+    parser.add_argument("--before", action="store_true")
     parser.add_argument("--one", nargs=3, metavar=("SOURCE", "TEMPLATE", "KIT"))
     options = parser.parse_args()
     if options.one:
@@ -155,11 +255,16 @@ def main() -> None:
     jobs |= {f"sample:{n}": (f"sample:{n}", sample(n).template) for n in sample_names()}
     memory = HERE / "paper_table.json"
     rows = json.loads(memory.read_text(encoding="utf-8")) if memory.is_file() else {}
+    old_version = None
+    if options.before:
+        folder = tempfile.TemporaryDirectory()
+        old_version = Before(Path(folder.name))
     for name in options.names or jobs:
         source, template = jobs[name]
         kit = options.kits / name.replace(":", "-")
         shutil.rmtree(kit, ignore_errors=True)
         command = [sys.executable, __file__, "--one", source, template, str(kit)]
+        spent = _children_seconds()
         done = subprocess.run(
             command,
             capture_output=True,
@@ -170,6 +275,7 @@ def main() -> None:
         if done.returncode:
             sys.exit(f"{name}: {done.stderr}")
         row = json.loads(done.stdout.splitlines()[-1])
+        row["cpu"] = _children_seconds() - spent
         if "summary" in row:
             motion = json.loads((kit / "motion.json").read_text(encoding="utf-8"))
             row["gap"] = motion["certificate"]["min_gap_mm"]
@@ -182,6 +288,8 @@ def main() -> None:
                 )
                 bad = [line for line in verdict.stdout.splitlines() if line.startswith("FAIL")]
                 row["verify"] = "passes" if verdict.returncode == 0 else "; ".join(bad) or "died"
+        if old_version is not None:
+            row["before"] = old_version.row(source, template)
         rows[name] = row
         print(
             f"{name}: exit {row['exit']}, {row['total']:.1f} s", row.get("verify", ""), flush=True

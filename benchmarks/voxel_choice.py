@@ -127,7 +127,8 @@ def trees_of(name: str, models: Path) -> list[dict[str, float]]:
     chosen = [found[k] for k in (*range(half), *spread)]
     problems = VoxelizationProblems(kit.recipe, kit.template, chosen, Wishes())
     rows = []
-    for option, voxels in enumerate(problems.options):
+    for option in problems.plain:
+        voxels = problems.options[option]
         job = problems.job(option, 1)
         if not isinstance(job, Job):
             continue

@@ -153,7 +153,7 @@ def test_a_round_looks_at_roomy_voxelizations_first_and_goes_on_where_it_pays(tm
     found = next(rounds.found())
     assert len(rounds.voxels(first)) == min(sizes)
     roomy, closing, *_ = schedule("quick", 0)
-    order = rounds.problems.closing_order()
+    order = rounds.problems.closing_order(rounds.problems.plain)
     assert sorted(order) == list(range(len(sizes)))
     best = max(rounds.problems.at_most(option) for option in order)
     assert rounds.problems.at_most(order[0]) == best

@@ -183,6 +183,7 @@ def _result_lines(kit: Kit, stage: str, checks: Sequence[Check]) -> list[str]:
     planned = kit.fold() if built is None else built.planned
     tree, motion = planned.tree, planned.motion
     joinery = None if built is None else built.joinery
+    lines += [f"note: {note}" for note in planned.voxels.notes if note not in notes]
     lines.append(
         f"{len(tree.source)} voxels in {len(tree.bodies)} bodies, {len(tree.hinges)} hinges, "
         f"folding into {tree.template.name} in {len(motion.moves) - 1} moves"

@@ -55,18 +55,23 @@ def first_trees(
     cut = cut_model(recipe, solid, template, wishes.regions, SilentProgress(), hasty=True)
     problems = VoxelizationProblems(recipe, template, cut.options, wishes)
     effort = schedule(recipe.effort, 0)[0].effort
-    turns = zip(range(len(problems.options)), _SEEDS, strict=False)
-    for number, option in enumerate(option for option, seeds in turns for _ in range(seeds)):
-        job = problems.job(option, number)
-        if isinstance(job, SeedResult):
-            continue
-        found = run_seed(replace(job, effort=effort), number, lambda _: None, lambda: False)
-        folded = (add_crease_hinges(tree, template) for tree in found.candidates)
-        trees = sorted((tree for tree in folded if tree is not None), key=_size)
-        for candidate in trees:
-            motion = motion_of(candidate.tree, candidate.path)
-            yield PlannedTree(problems.options[option], candidate.tree, motion)
-        if trees:
+    for options in (problems.plain, problems.bossed):
+        fits = False
+        turns = zip(options, _SEEDS, strict=False)
+        for number, option in enumerate(option for option, seeds in turns for _ in range(seeds)):
+            job = problems.job(option, number)
+            if isinstance(job, SeedResult):
+                continue
+            found = run_seed(replace(job, effort=effort), number, lambda _: None, lambda: False)
+            fits = fits or found.fits
+            folded = (add_crease_hinges(tree, template) for tree in found.candidates)
+            trees = sorted((tree for tree in folded if tree is not None), key=_size)
+            for candidate in trees:
+                motion = motion_of(candidate.tree, candidate.path)
+                yield PlannedTree(problems.options[option], candidate.tree, motion)
+            if trees:
+                return
+        if fits:
             return
 
 

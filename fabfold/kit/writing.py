@@ -157,7 +157,7 @@ def kit_summary(
         **({"profile": profile} if profile else {}),
         **_printed_apart(built),
         **({} if built.retention is None else retention_summary(built, built.retention)),
-        "notes": list(joinery.notes),
+        "notes": [*joinery.notes, *(note for note in voxels.notes if note not in solid.notes)],
         "refused_trees": list(built.refused),
         **({"wishes": list(wishes)} if wishes else {}),
     }

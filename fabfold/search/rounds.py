@@ -17,7 +17,7 @@ from fabfold.recipe.recipe import Recipe
 from fabfold.recipe.recipe_wishes import wished
 from fabfold.search.run import Budget, Tally, executor, require_fit, run_seeds, warm_up
 from fabfold.search.saved import SeedCache
-from fabfold.search.schedule import SEEDS_PER_ROUND, Rung, SeedTask, schedule
+from fabfold.search.schedule import SEEDS_PER_ROUND, Rung, SeedTask, best_lines, schedule
 from fabfold.search.seeds import Batch, Event, Executor, Job, SeedResult
 from fabfold.search.standby import SearchStandby
 from fabfold.search.voxelization_problems import VoxelizationProblems
@@ -107,6 +107,7 @@ class Rounds:
         self._standby = standby
         self._option_of: dict[int, int] = {}
         self._origin: dict[int, int] = {}
+        self._bosses_from = SEED_STRIDE  # the number of a round that never comes
         self._done: dict[int, list[Found]] = {}
         self._ranked: list[Found] | None = None
 
@@ -138,8 +139,7 @@ class Rounds:
         NoFoldError
             If no voxelization allows it, or no round found one.
         """
-        options = range(len(self.problems.options))
-        most = max(self.problems.at_most(option) for option in options)
+        most = max(self.problems.at_most(option) for option in self.problems.plain)
         if most < share:
             raise NoFoldError(
                 f"--closed {share:g}: no box of {self.template.name} can be closed further than to "
@@ -173,6 +173,7 @@ class Rounds:
                 pairs = self._round(number)
             except NoTreeError as error:
                 why = why or str(error)
+                self._no_tree_fits(number)
                 continue
             fits = True
             if pairs:
@@ -186,6 +187,13 @@ class Rounds:
                 "--effort thorough, more --rounds, another --seed or a larger template"
                 + self._about_wishes()
             )
+
+    def _no_tree_fits(self, number: int) -> bool:
+        """Let hinges stand on bosses from the next round on; False where that is nothing new."""
+        if not self.problems.bossed or number >= self._bosses_from:
+            return False
+        self._bosses_from = min(self._bosses_from, number + 1)
+        return True
 
     def _about_wishes(self) -> str:
         """What else may help, as the end of a sentence."""
@@ -230,10 +238,11 @@ class Rounds:
         rounds = SEED_STRIDE // SEEDS_PER_ROUND
         if seconds <= 0:
             for number in range(rounds):
-                held = self._held(number)
-                if not held:
+                if not (held := self._held(number)):
                     break
                 results |= held
+                if not any(result.fits for result in results.values()):
+                    self._no_tree_fits(number)
             return results
         with self._open_progress("fit") as progress:
             self.wait_for_kernels(progress)
@@ -246,7 +255,8 @@ class Rounds:
                 for number in range(rounds):
                     results |= self._search_round(number, pool, tally, budget)
                     tally.check_failures()
-                    if budget.over() or not any(result.fits for result in results.values()):
+                    fits = any(result.fits for result in results.values())
+                    if budget.over() or not (fits or self._no_tree_fits(number)):
                         break
         tally.check_failures()
         return results
@@ -371,13 +381,14 @@ class Rounds:
         if rung.takes == "best":
             return [
                 self._task(number, seed, self._option_of[start.seed], rung, start)
-                for seed, start in zip(seeds, self._starts(results), strict=False)
+                for seed, start in zip(seeds, best_lines(results, self._origin), strict=False)
             ]
-        order = list(range(len(self.problems.options)))
+        options = self.problems.bossed if number >= self._bosses_from else self.problems.plain
+        order = list(options)
         if rung.takes == "closing":
-            order = self.problems.closing_order()
+            order = self.problems.closing_order(options)
         elif rung.takes == "promising":
-            order = self.problems.promising_order(self._best_by_option(results))
+            order = self.problems.promising_order(options, self._best_by_option(results))
         order = order[: rung.options]
         return [
             self._task(number, seed, order[k % len(order)], rung) for k, seed in enumerate(seeds)
@@ -390,19 +401,6 @@ class Rounds:
             option = self._option_of[seed]
             found[option] = min(results[seed].best, found.get(option, float("inf")))
         return found
-
-    def _starts(self, results: Mapping[int, SeedResult]) -> list[Candidate]:
-        """The best tree of each seed, and of the seeds that went on from it, best first."""
-        line: dict[int, int] = {}
-        best: dict[int, Candidate] = {}
-        for seed in sorted(results):
-            for candidate in results[seed].candidates[:1]:
-                root = line.get(self._origin.get(seed, seed), self._origin.get(seed, seed))
-                line[seed] = root
-                known = best.get(root)
-                if known is None or candidate.energy["total"] < known.energy["total"]:
-                    best[root] = replace(candidate, seed=seed)
-        return sorted(best.values(), key=lambda c: (c.energy["total"], c.seed))
 
     def _task(
         self,

@@ -9,14 +9,16 @@ budgets are counts.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from fabfold.search.seeds import SeedResult
 from fabfold.tree.candidate import Candidate
 from fabfold.tree.catalogue import JointSet
 from fabfold.tree.effort import EFFORTS, Effort
 
-__all__ = ["SEEDS_PER_ROUND", "Rung", "SeedTask", "schedule"]
+__all__ = ["SEEDS_PER_ROUND", "Rung", "SeedTask", "best_lines", "schedule"]
 
 #: Numbers that a round keeps for its seeds; a constant, so that rounds of any effort keep theirs.
 SEEDS_PER_ROUND = 100
@@ -128,6 +130,33 @@ def schedule(effort: str, number: int, *, large: bool = False) -> tuple[Rung, ..
     if number == 0:
         return (first, *others)
     return (replace(first, seeds=4, options=4), *others)
+
+
+def best_lines(results: Mapping[int, SeedResult], origin: Mapping[int, int]) -> list[Candidate]:
+    """The best tree of each seed and of the seeds that went on from it.
+
+    Parameters
+    ----------
+    results : mapping of int to SeedResult
+        By seed.
+    origin : mapping of int to int
+        For each seed that went on from a tree, the seed that had found it.
+
+    Returns
+    -------
+    list of Candidate
+        One for each line, best first; each bears the seed that found it last.
+    """
+    line: dict[int, int] = {}
+    best: dict[int, Candidate] = {}
+    for seed in sorted(results):
+        for candidate in results[seed].candidates[:1]:
+            root = line.get(origin.get(seed, seed), origin.get(seed, seed))
+            line[seed] = root
+            known = best.get(root)
+            if known is None or candidate.energy["total"] < known.energy["total"]:
+                best[root] = replace(candidate, seed=seed)
+    return sorted(best.values(), key=lambda c: (c.energy["total"], c.seed))
 
 
 @dataclass(frozen=True)

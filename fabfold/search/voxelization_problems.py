@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from fabfold.errors import NoTreeError, RecipeError
 from fabfold.fold.lattice_foldability import LatticeFoldability
@@ -104,7 +105,13 @@ class VoxelizationProblems:
     ----------
     options : list of Voxels
         Those in which the wishes can come true, from the fewest voxels on, see
-        :func:`search_order`. They are spoken of by their number here.
+        :func:`search_order`; then the same with bosses. They are spoken of by their number here.
+    plain : range
+        Numbers of the former.
+    bossed : range
+        Numbers of the latter, for models of which no tree fits: where few edges of a thin limb have
+        material for a hinge, it may be too stiff to be laid into the template. There are none where
+        hinges may stand on bosses anyway, or the model is not to be made thicker.
 
     Raises
     ------
@@ -118,10 +125,16 @@ class VoxelizationProblems:
         self, recipe: Recipe, template: Template, options: Sequence[Voxels], wishes: Wishes
     ) -> None:
         self.recipe, self.template, self.wishes = recipe, template, wishes
-        self.options = usable(options, template, wishes)
+        plain = usable(options, template, wishes)
+        bossed = [replace(voxels, bosses=True) for voxels in plain]
+        if recipe.thicken == "off" or all(voxels.bosses for voxels in plain):
+            bossed = []
+        self.options = plain + bossed
+        self.plain = range(len(plain))
+        self.bossed = range(len(plain), len(self.options))
         self._jobs: dict[tuple[int, JointSet], Job | SeedResult] = {}
         self._at_most: dict[tuple[int, JointSet], float] = {}
-        self._closing: list[int] | None = None
+        self._closing: dict[range, list[int]] = {}
 
     def job(self, option: int, seed: int, joints: JointSet | None = None) -> Job | SeedResult:
         """The problem of a voxelization, or the result where it rules every tree out.
@@ -164,17 +177,17 @@ class VoxelizationProblems:
             return SeedResult((), fits=False, why=str(error))
         return Job(problem, LatticeFoldability(), Effort())
 
-    def closing_order(self) -> list[int]:
-        """Voxelizations by how open the box is likely to stay; with --protect by cuts.
+    def closing_order(self, options: range) -> list[int]:
+        """Some voxelizations by how open the box is likely to stay; with --protect by cuts.
 
         See :mod:`fabfold.voxels.openness`.
         """
-        if self._closing is None:
-            order = list(range(len(self.options)))
+        if options not in self._closing:
+            order = list(options)
             if not self.wishes.regions:
                 order.sort(key=self._openness)
-            self._closing = order
-        return self._closing
+            self._closing[options] = order
+        return self._closing[options]
 
     def _openness(self, option: int) -> float:
         """Faces that must stay open, and cells' worth of space among the voxels."""
@@ -193,11 +206,13 @@ class VoxelizationProblems:
             ranks[size] = rank
         return [ranks[len(voxels)] for voxels in self.options]
 
-    def promising_order(self, found: Mapping[int, float]) -> list[int]:
-        """Voxelizations by the best tree found on each, or by what is to be expected.
+    def promising_order(self, options: range, found: Mapping[int, float]) -> list[int]:
+        """Some voxelizations by the best tree found on each, or by what is to be expected.
 
         Parameters
         ----------
+        options : range
+            Numbers of the voxelizations.
         found : mapping of int to float
             Least energy by voxelization; infinite where nothing folded.
 
@@ -209,7 +224,7 @@ class VoxelizationProblems:
             and is of their size, where a size that pays folds: room decides.
         """
         weight = weights_of(self.recipe).surface
-        floor = {option: weight * self._openness(option) for option in range(len(self.options))}
+        floor = {option: weight * self._openness(option) for option in options}
         gaps = [found[option] - floor[option] for option in found]
         gap = min(gaps, default=0.0)
         size = [len(voxels) for voxels in self.options]
@@ -224,7 +239,7 @@ class VoxelizationProblems:
                 return float("inf")
             return floor[option] + gap
 
-        return sorted(self.closing_order(), key=expected)
+        return sorted(self.closing_order(options), key=expected)
 
     def at_most(self, option: int) -> float:
         """Share to which the box could be closed with a voxelization; 0 where no tree fits."""

@@ -22,7 +22,7 @@ from fabfold.voxels.features import features
 from fabfold.voxels.grid_placement import grid_rotations
 from fabfold.voxels.offsets import CellEnergy
 from fabfold.voxels.refinement import Refinement
-from fabfold.voxels.voxel_model import Voxels
+from fabfold.voxels.voxel_model import BOSSES_NOTE, Voxels
 
 __all__ = ["Cut", "cut_thick", "scarce_hinges"]
 
@@ -77,10 +77,7 @@ class Cut:
                 f"{self.wanted * voxel_mm:.1f} mm now)"
             )
         if any(voxels.bosses for voxels in self.options):
-            told.append(
-                "the model is thin where voxels touch: hinges may stand on bosses beside it, which "
-                "struts tie to it"
-            )
+            told.append(BOSSES_NOTE)
         return tuple(told)
 
 

@@ -7,10 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["SUBDIVISION", "Voxels"]
+__all__ = ["BOSSES_NOTE", "SUBDIVISION", "Voxels"]
 
 #: Subvoxels along the side of a voxel (paper section 3: 20 x 20 x 20).
 SUBDIVISION = 20
+#: What `bosses` mean, in a maker's words.
+BOSSES_NOTE = (
+    "the model is thin where voxels touch: hinges may stand on bosses beside it, which struts tie "
+    "to it"
+)
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,11 @@ class Voxels:
 
     def __len__(self) -> int:
         return len(self.cells)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What people should know of these voxels."""
+        return (BOSSES_NOTE,) if self.bosses else ()
 
     def in_axes(self, axes: NDArray[np.float64]) -> Voxels:
         """The same voxels of the model in the axes that it had before.
