@@ -10,6 +10,7 @@ from fabfold.kit import first_trees as first_trees_module
 from fabfold.kit.first_trees import first_trees
 from fabfold.kit.kit import Kit
 from fabfold.progress import SilentListener
+from fabfold.search.pareto import solutions
 from fabfold.search.rounds import Rounds
 from fabfold.store import StageStore
 from fabfold.tree.kinematics_check import check_tree
@@ -47,17 +48,22 @@ def kit_of_any(**options):
     return Kit.from_model("sample:car", template="box-2x2x4", workers=1, effort="quick", **options)
 
 
-def rounds_of(voxels, store=None, **options):
-    kit = kit_of_any(**options)
+def rounds_with(recipe, template, voxels, store, shift=0):
     return Rounds(
-        kit.recipe,
-        kit.template,
+        recipe,
+        template,
         [voxels],
         key="",
-        store=store or StageStore(None),
+        store=store,
         workers=1,
         open_progress=SilentListener().stage,
+        shift=shift,
     )
+
+
+def rounds_of(voxels, store=None, **options):
+    kit = kit_of_any(**options)
+    return rounds_with(kit.recipe, kit.template, voxels, store or StageStore(None))
 
 
 def key(found):
@@ -86,6 +92,18 @@ def test_bosses_come_where_no_tree_fits_and_not_before(tmp_path):
     assert key(next(rounds.found())) == key(found)
     assert key(next(rounds_of(voxels, StageStore(tmp_path)).found())) == key(found)
     assert key(rounds_of(voxels, StageStore(tmp_path)).ranked(0.0)) == key(found)
+
+
+@pytest.mark.slow
+def test_the_pareto_list_has_bosses_where_no_tree_fits():
+    kit = kit_of_any()
+
+    def begin(recipe, shift):
+        return rounds_with(recipe, kit.template, lolly(), StageStore(None), shift=shift)
+
+    found = solutions(kit.recipe, begin, SilentListener().stage)
+    assert found
+    assert all(solution.voxels.bosses for solution in found)
 
 
 @pytest.mark.slow

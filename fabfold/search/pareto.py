@@ -135,6 +135,9 @@ def solutions(
         fits, why = fits or fitted, why or reason
         if found:
             return undominated(found)
+        if not fitted:
+            for rounds in ladder:
+                rounds.no_tree_fits(number)
     if not fits:
         raise NoTreeError(why)
     raise NoFoldError(

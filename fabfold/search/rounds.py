@@ -173,7 +173,7 @@ class Rounds:
                 pairs = self._round(number)
             except NoTreeError as error:
                 why = why or str(error)
-                self._no_tree_fits(number)
+                self.no_tree_fits(number)
                 continue
             fits = True
             if pairs:
@@ -188,7 +188,7 @@ class Rounds:
                 + self._about_wishes()
             )
 
-    def _no_tree_fits(self, number: int) -> bool:
+    def no_tree_fits(self, number: int) -> bool:
         """Let hinges stand on bosses from the next round on; False where that is nothing new."""
         if not self.problems.bossed or number >= self._bosses_from:
             return False
@@ -242,7 +242,7 @@ class Rounds:
                     break
                 results |= held
                 if not any(result.fits for result in results.values()):
-                    self._no_tree_fits(number)
+                    self.no_tree_fits(number)
             return results
         with self._open_progress("fit") as progress:
             self.wait_for_kernels(progress)
@@ -256,7 +256,7 @@ class Rounds:
                     results |= self._search_round(number, pool, tally, budget)
                     tally.check_failures()
                     fits = any(result.fits for result in results.values())
-                    if budget.over() or not (fits or self._no_tree_fits(number)):
+                    if budget.over() or not (fits or self.no_tree_fits(number)):
                         break
         tally.check_failures()
         return results
