@@ -61,7 +61,7 @@ def measure(source: str, template: str, seed: int, effort: str) -> dict[str, Any
         row |= {
             "bodies": len(built.joinery.bodies),
             "gap_mm": built.planned.motion.certificate["min_gap_mm"],
-            "notes": list(kit.cut_solid().notes),
+            "notes": list(dict.fromkeys([*kit.cut_solid().notes, *planned.voxels.notes])),
         }
         checks = timed("checks", kit.check)
         row["failed"] = [f"{check.name}: {check.note}" for check in checks if not check.ok]

@@ -119,9 +119,11 @@ class Before:
 
     def row(self, source: str, template: str) -> dict[str, Any]:
         """Make a kit and return its seconds and what its report says."""
+        from fabfold.progress import processor_seconds
+
         kit = self._folder / "kit"
         shutil.rmtree(kit, ignore_errors=True)
-        spent, start = _children_seconds(), time.perf_counter()
+        spent, start = processor_seconds(), time.perf_counter()
         done = subprocess.run(
             [sys.executable, str(self._folder / "export.py"), source, template, str(kit)],
             capture_output=True,
@@ -134,19 +136,13 @@ class Before:
         )
         row: dict[str, Any] = {
             "exit": done.returncode,
-            "cpu": _children_seconds() - spent,
+            "cpu": processor_seconds() - spent,
             "total": time.perf_counter() - start,
         }
         report = kit / "report.json"
         if report.is_file():
             row["summary"] = json.loads(report.read_text(encoding="utf-8"))["summary"]
         return row
-
-
-def _children_seconds() -> float:
-    """Processor seconds of processes that have ended and were waited for."""
-    spent = os.times()
-    return spent.children_user + spent.children_system
 
 
 def before_table(rows: dict[str, dict[str, Any]]) -> list[str]:
@@ -249,6 +245,7 @@ def main() -> None:
         print(json.dumps(run_one(source, template, Path(kit))))
         return
 
+    from fabfold.progress import processor_seconds
     from fabfold.samples.builtin import sample, sample_names
 
     jobs = {n: (str(options.models / m[0]), m[1]) for n, m in MODELS.items()}
@@ -264,7 +261,7 @@ def main() -> None:
         kit = options.kits / name.replace(":", "-")
         shutil.rmtree(kit, ignore_errors=True)
         command = [sys.executable, __file__, "--one", source, template, str(kit)]
-        spent = _children_seconds()
+        spent = processor_seconds()
         done = subprocess.run(
             command,
             capture_output=True,
@@ -275,7 +272,7 @@ def main() -> None:
         if done.returncode:
             sys.exit(f"{name}: {done.stderr}")
         row = json.loads(done.stdout.splitlines()[-1])
-        row["cpu"] = _children_seconds() - spent
+        row["cpu"] = processor_seconds() - spent
         if "summary" in row:
             motion = json.loads((kit / "motion.json").read_text(encoding="utf-8"))
             row["gap"] = motion["certificate"]["min_gap_mm"]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from voxel_cases import material_voxels
 
 from fabfold.errors import NoTreeError
 from fabfold.kit import first_trees as first_trees_module
@@ -16,7 +17,7 @@ from fabfold.store import StageStore
 from fabfold.tree.kinematics_check import check_tree
 from fabfold.voxels.features import features
 from fabfold.voxels.thickening import Cut, scarce_hinges
-from fabfold.voxels.voxel_model import BOSSES_NOTE, Voxels
+from fabfold.voxels.voxel_model import BOSSES_NOTE
 from fabfold.wishes.wish_list import Wishes
 
 
@@ -24,24 +25,12 @@ def lolly():
     """A block of 2 x 2 x 2 full voxels on a bar of five, which run through their middle."""
     block = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
     bar = [(x, 0, 0) for x in range(2, 7)]
-    cells = np.array(sorted(block + bar), dtype=np.int32)
+    cells = sorted(block + bar)
     material = np.ones((len(cells), 20, 20, 20), dtype=bool)
     thin = np.zeros((20, 20, 20), dtype=bool)
     thin[:, 7:13, 7:13] = True
-    material[cells[:, 0] > 1] = thin
-    return Voxels(
-        cells=cells,
-        subvoxels=material,
-        fill=material.mean(axis=(1, 2, 3)),
-        vertices=np.zeros((0, 3)),
-        faces=np.zeros((0, 3), dtype=np.int32),
-        rotation=np.eye(3),
-        origin=np.zeros(3),
-        pitch=1.0,
-        plane_offsets=(np.zeros(8), np.zeros(3), np.zeros(3)),
-        lost_volume=0.0,
-        energy={},
-    )
+    material[[cell[0] > 1 for cell in cells]] = thin
+    return material_voxels(cells, material)
 
 
 def kit_of_any(**options):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 from typer.testing import CliRunner
+from voxel_cases import material_voxels
 
 from fabfold.cli.app import app
 from fabfold.errors import NoVoxelsError, RecipeError
@@ -21,7 +22,6 @@ from fabfold.solid.thicken import inner_balls, thickened
 from fabfold.voxels.features import features
 from fabfold.voxels.thickening import STEPS, cut_thick, scarce_hinges
 from fabfold.voxels.voxel_files import load_voxels, save_voxels
-from fabfold.voxels.voxel_model import Voxels
 
 BOX = load_template("box-2x2x2")
 
@@ -45,19 +45,7 @@ def bars():
     """Two voxels with a square bar through the middle of the face between them."""
     material = np.zeros((2, 20, 20, 20), dtype=bool)
     material[:, :, 7:13, 7:13] = True
-    return Voxels(
-        cells=np.array([[0, 0, 0], [1, 0, 0]], dtype=np.int32),
-        subvoxels=material,
-        fill=material.mean(axis=(1, 2, 3)),
-        vertices=np.zeros((0, 3)),
-        faces=np.zeros((0, 3), dtype=np.int32),
-        rotation=np.eye(3),
-        origin=np.zeros(3),
-        pitch=1.0,
-        plane_offsets=(np.zeros(3), np.zeros(2), np.zeros(2)),
-        lost_volume=0.0,
-        energy={},
-    )
+    return material_voxels([(0, 0, 0), (1, 0, 0)], material)
 
 
 def test_balls_between_two_faces_have_half_their_distance_as_radius():

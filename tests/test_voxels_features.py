@@ -2,33 +2,13 @@
 
 import numpy as np
 import pytest
+from voxel_cases import material_voxels
 
 from fabfold.errors import KitError
 from fabfold.lattice.rotations import FACES
 from fabfold.voxels.features import contact_counts, face_pairs, features, largest_pieces
 from fabfold.voxels.voxel_files import load_voxels, save_voxels
 from fabfold.voxels.voxel_model import Voxels
-
-
-def voxels_of(cells: list[tuple[int, int, int]], material: np.ndarray | None = None) -> Voxels:
-    """Voxels with the given material, full cubes by default; the mesh is a mere placeholder."""
-    where = np.array(cells, dtype=np.int32)
-    solid = np.ones((len(cells), 20, 20, 20), dtype=bool) if material is None else material
-    extent = where.max(axis=0) + 2
-    return Voxels(
-        cells=where,
-        subvoxels=solid,
-        fill=solid.mean(axis=(1, 2, 3)),
-        vertices=np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float),
-        faces=np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], dtype=np.int32),
-        rotation=np.eye(3),
-        origin=np.array([0.25, -1.0, 3.0]),
-        pitch=12.5,
-        plane_offsets=tuple(np.zeros(n) for n in extent),
-        lost_volume=0.015625,
-        energy={"fullness": 1.5, "score": -0.25},
-    )
-
 
 PAIRS = [[(0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 1, 0)], [(0, 0, 0), (0, 0, 1)]]
 
@@ -40,7 +20,7 @@ def test_pairs_are_the_faces_that_cells_share():
 
 @pytest.mark.parametrize("cells", PAIRS)
 def test_two_full_cubes_carry_every_joint(cells):
-    found = features(voxels_of(cells))
+    found = features(material_voxels(cells))
     assert found.rigid.all()
     assert found.hinge.all()
     assert found.double.all()
@@ -57,7 +37,7 @@ def test_a_wall_along_one_edge_holds_that_hinge_only(axis, edge):
     wall = [slice(None)] * 4
     wall[across + 1] = slice(17, 20) if direction[across] > 0 else slice(0, 3)
     material[tuple(wall)] = True
-    found = features(voxels_of(PAIRS[axis], material))
+    found = features(material_voxels(PAIRS[axis], material))
     # The wall is 3 deep: it carries its own edge along its whole length, and the ends of the
     # two edges across it, at 3 positions of 20 each: too short.
     assert found.hinge[0].tolist() == [i == edge for i in range(4)]
@@ -68,11 +48,11 @@ def test_hinge_wants_material_on_both_sides_and_a_third_of_the_edge():
     material = np.zeros((2, 20, 20, 20), dtype=bool)
     material[0] = True
     material[1, :3, :, :6] = True
-    found = features(voxels_of(PAIRS[0], material))
+    found = features(material_voxels(PAIRS[0], material))
     # Edges +y, -y, +z, -z of a face across x.
     assert found.hinge[0].tolist() == [True, True, False, True]
     material[1, :, :, 5] = False
-    found = features(voxels_of(PAIRS[0], material))
+    found = features(material_voxels(PAIRS[0], material))
     assert found.hinge[0].tolist() == [False, False, False, True]
 
 
@@ -80,11 +60,11 @@ def test_contact_needs_material_on_both_sides():
     material = np.zeros((2, 20, 20, 20), dtype=bool)
     material[0, :, :10] = True
     material[1, :, 9:] = True
-    found = features(voxels_of(PAIRS[0], material))
+    found = features(material_voxels(PAIRS[0], material))
     assert found.rigid.tolist() == [True]
     assert found.double.tolist() == [False]
     material[1, :, 9, 0] = False
-    found = features(voxels_of(PAIRS[0], material))
+    found = features(material_voxels(PAIRS[0], material))
     assert found.rigid.tolist() == [False]
 
 
@@ -93,7 +73,7 @@ def test_a_second_leg_in_a_cell_holds_nothing():
     material[0, :, :8] = True
     material[0, :, 15:] = True  # the second, smaller leg
     material[1, :, 15:] = True
-    found = features(voxels_of(PAIRS[0], material))
+    found = features(material_voxels(PAIRS[0], material))
     assert not found.rigid[0]
     assert not found.hinge.any()
     assert not found.double.any()
@@ -121,7 +101,7 @@ def test_contacts_are_counted_across_the_shared_face(axis):
 def test_depth_is_the_mean_ray_to_the_first_material():
     material = np.zeros((1, 20, 20, 20), dtype=bool)
     material[0, 4:10, :, :10] = True
-    depth = features(voxels_of([(0, 0, 0)], material)).depth[0]
+    depth = features(material_voxels([(0, 0, 0)], material)).depth[0]
     # Through x, half of the rays meet the slab; the others run through.
     assert depth[0] == pytest.approx(0.5 * 10 / 20 + 0.5)
     assert depth[1] == pytest.approx(0.5 * 4 / 20 + 0.5)
@@ -133,7 +113,7 @@ def test_depth_is_the_mean_ray_to_the_first_material():
 
 
 def test_one_voxel_has_no_pairs():
-    found = features(voxels_of([(0, 0, 0)]))
+    found = features(material_voxels([(0, 0, 0)]))
     assert found.pairs.shape == (0, 2)
     assert found.hinge.shape == (0, 4)
 
@@ -154,7 +134,7 @@ def same(one: Voxels, other: Voxels) -> bool:
 
 def test_voxels_come_back_from_disk_and_bytes_repeat(tmp_path):
     material = np.random.default_rng(0).random((3, 20, 20, 20)) < 0.3
-    voxels = voxels_of([(0, 0, 0), (0, 0, 1), (2, 1, 0)], material)
+    voxels = material_voxels([(0, 0, 0), (0, 0, 1), (2, 1, 0)], material)
     save_voxels(tmp_path / "a.npz", voxels)
     save_voxels(tmp_path / "b.npz", voxels)
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
@@ -172,7 +152,7 @@ def test_a_damaged_file_is_named(tmp_path, content):
 
 def test_a_truncated_file_and_a_foreign_npz_are_refused(tmp_path):
     path = tmp_path / "voxels.npz"
-    save_voxels(path, voxels_of([(0, 0, 0)]))
+    save_voxels(path, material_voxels([(0, 0, 0)]))
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(KitError):
         load_voxels(path)
