@@ -2,7 +2,10 @@
 
 import io
 import json
+import os
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +15,13 @@ from stage_listener import StageListener
 
 from fabfold.errors import CheckError, GeometryError, NoFoldError
 from fabfold.kit import early as early_module
+from fabfold.kit import first_trees as first_trees_module
 from fabfold.kit.cutting_stage import cut_model
 from fabfold.kit.early import EarlyKit, write_early
 from fabfold.kit.first_trees import first_trees
 from fabfold.kit.kit import Kit
 from fabfold.progress import SilentListener, SilentProgress
+from fabfold.search.seeds import run_seed
 from fabfold.tree.kinematics_check import check_tree
 from fabfold.voxels.voxelize import MAX_LOSS, fill_shares
 
@@ -90,6 +95,49 @@ def test_the_first_trees_fold_and_come_with_few_hinges_first(bar_kit):
         assert len(planned.motion.moves) >= 2
     again = first_trees(bar_kit.recipe, template, bar_kit.solid(), bar_kit.wishes())
     assert np.array_equal(next(again).tree.target, trees[0].tree.target)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("unlucky", "run"), [((), [0, 1]), ((0,), [0, 1, 2]), ((0, 1), [0, 1, 2])])
+def test_the_best_of_two_lucky_seeds_is_taken(bar_kit, monkeypatch, unlucky, run):
+    asked, sizes = [], []
+
+    def some(job, seed, *rest):
+        asked.append(seed)
+        found = run_seed(job, seed, *rest)
+        if seed in unlucky:
+            return replace(found, candidates=())
+        sizes.extend(len(candidate.tree.hinges) for candidate in found.candidates)
+        return found
+
+    monkeypatch.setattr(first_trees_module, "run_seed", some)
+    monkeypatch.setattr(first_trees_module, "add_crease_hinges", lambda tree, _: tree)
+    kit = bar_kit
+    first = next(first_trees(kit.recipe, kit.template, kit.solid(), kit.wishes()))
+    assert asked == run
+    assert len(first.tree.hinges) == min(sizes)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux keeps a process to some cores")
+def test_manifold_keeps_to_one_core_and_the_process_to_all():
+    code = (
+        "import os; before = os.sched_getaffinity(0)\n"
+        "from fabfold.kit.early import _keep_manifold_to_one_core as keep\n"
+        "keep()\n"
+        "from manifold3d import Manifold\n"
+        "ball = Manifold.sphere(1.0, 400)\n"
+        "(ball - ball.translate((0.5, 0.0, 0.0))).num_tri()\n"
+        "assert os.sched_getaffinity(0) == before\n"
+        "print(len(os.listdir('/proc/self/task')))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["1"], "no threads beside the first one"
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """Many seeds over processes: the same answer, whoever runs it and whatever dies."""
 
 import multiprocessing
+import os
 import signal
 import subprocess
 import sys
@@ -102,6 +103,21 @@ def test_a_killed_worker_costs_nothing(problem, alone, tmp_path):
     found = search(problem, range(4), judge, EFFORT, workers=2)
     assert len(list(tmp_path.iterdir())) == 1
     assert key(found) == key(alone)
+
+
+def _step_back(connection, before):
+    processes._begin()
+    connection.send(os.getpriority(os.PRIO_PROCESS, 0) - before)
+
+
+@pytest.mark.skipif(not hasattr(os, "nice"), reason="there are no priorities here")
+def test_workers_step_back_for_what_a_person_waits_for():
+    ours, theirs = multiprocessing.Pipe()
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    process = processes._started(_step_back, theirs, before)
+    assert ours.poll(60)
+    assert ours.recv() == min(processes._NICE, 19 - before)
+    process.join()
 
 
 def test_workers_that_still_load_kernels_are_ended_and_not_waited_for(monkeypatch):

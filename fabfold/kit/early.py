@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import signal
 import subprocess
@@ -214,11 +215,30 @@ def _first_built(
     raise why or NoFoldError("nothing folds yet")
 
 
+def _keep_manifold_to_one_core() -> None:
+    """Let manifold3d use one core: the search needs the others, and its threads mostly wait.
+
+    It asks the system once, at its first work, how many there are.
+    """
+    if sys.platform != "linux":
+        return
+    from manifold3d import Manifold
+
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(cores)})
+    try:
+        ball = Manifold.sphere(1.0, 40)
+        (ball - ball.translate((0.5, 0.0, 0.0))).num_tri()
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
 if __name__ == "__main__":
     end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     for name in _NEEDED:
         import_module(name)
+    _keep_manifold_to_one_core()
     # Given up before it writes anything, or not at all: there are no half-written kits.
     said = write_early(sys.stdin.buffer, lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN))
     sys.stderr.write(f"{said}\n")

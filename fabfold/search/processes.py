@@ -27,6 +27,8 @@ _SPAWN = multiprocessing.get_context("spawn")
 PATIENCE = 5.0
 #: Seconds that a worker on standby waits for its first seed before it ends.
 STANDBY = 60.0
+#: How far workers step back where there are fewer cores than processes.
+_NICE = 10
 
 
 class InProcessExecutor:
@@ -256,6 +258,8 @@ def _begin() -> None:
     """Leave Ctrl-C to the process that started this one, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if hasattr(os, "nice"):  # What a person waits for goes first: the first kit, and the screen.
+        os.nice(_NICE)
     caller = multiprocessing.parent_process()
     end_with_parent(None if caller is None else caller.pid)
 
