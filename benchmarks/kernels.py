@@ -109,7 +109,7 @@ def do_certify(_seed: int) -> str:
     """The swept proof of a barrel in its sleeve."""
     import manifold3d
 
-    from fabfold.proof.bvh import new_box_trees, refit
+    from fabfold.proof.bvh import fit, new_bodies
     from fabfold.proof.gap import prove_gap
 
     cylinder = manifold3d.Manifold.cylinder
@@ -118,8 +118,9 @@ def do_certify(_seed: int) -> str:
     for solid in (cylinder(8.0, 2.5, 2.5, 24, True), sleeve):
         mesh = solid.to_mesh64()
         parts.append(np.array(mesh.vert_properties[:, :3])[np.array(mesh.tri_verts)])
-    boxes, _ = new_box_trees(parts)
-    refit(boxes, boxes.triangle.copy(), 0, int(boxes.root[-1]))
+    boxes, bodies = new_bodies(parts)
+    for body in range(len(parts)):
+        fit(boxes, bodies, body)
     result = np.array([1.0, np.inf, 0.0])
     verdict = prove_gap(boxes, 0, 1, 0.0, np.pi / 2, 0.2, 0.01, result)
     return digest(int(verdict), result)

@@ -9,12 +9,13 @@ import fcl
 import joinery_models
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from fabfold.errors import CheckError
 from fabfold.fold.motion import Motion
-from fabfold.proof.bvh import new_box_trees, refit
+from fabfold.proof.bvh import fit, new_bodies, place
 from fabfold.proof.certify import certify
-from fabfold.proof.gap import DONE, FAILED, prove_gap
+from fabfold.proof.gap import DONE, FAILED, prove_gap, prove_pairs
 from fabfold.proof.triangles import plane_gap, triangle_distance
 
 VOXEL = 10.0
@@ -139,8 +140,13 @@ def test_order_of_triangles_does_not_matter_and_runs_repeat():
 
 
 def fitted(meshes):
-    boxes, _ = new_box_trees([np.asarray(v, float)[f] for v, f in meshes])
-    refit(boxes, boxes.triangle.copy(), 0, int(boxes.root[-1]))
+    return fitted_triangles([np.asarray(v, float)[f] for v, f in meshes])
+
+
+def fitted_triangles(triangles):
+    boxes, bodies = new_bodies(triangles)
+    for body in range(len(triangles)):
+        fit(boxes, bodies, body)
     return boxes
 
 
@@ -161,6 +167,47 @@ def test_a_barrel_in_its_sleeve_keeps_the_radial_gap():
     assert prove_gap(fitted([pin, sleeve]), 0, 1, 0.0, np.pi, true + 0.01, 0.005, result) == FAILED
 
 
+def test_roots_are_large_enough_for_where_bodies_are_placed():
+    rng = np.random.default_rng(3)
+    meshes = [rng.normal(size=(7, 3, 3)) + rng.normal(size=3) * 4 for _ in range(5)]
+    boxes, bodies = new_bodies(meshes)
+    poses = np.tile(np.eye(4), (5, 1, 1))
+    for pose in poses:
+        pose[:3, :3] = Rotation.random(rng=rng).as_matrix()
+        pose[:3, 3] = rng.normal(size=3)
+    place(boxes, bodies, poses)
+    root = boxes.root[:-1]
+    rough_box, rough = boxes.box[root].copy(), boxes.invariant[root].copy()
+    for body, (pose, mesh) in enumerate(zip(poses, meshes, strict=True)):
+        assert not bodies.fitted[body]
+        corners = (mesh @ pose[:3, :3].T + pose[:3, 3]).reshape(-1, 3)
+        assert (rough_box[body, :3] <= corners.min(axis=0)).all()
+        assert (rough_box[body, 3:] >= corners.max(axis=0)).all()
+        fit(boxes, bodies, body)
+        assert np.allclose(boxes.box[root[body], :3], corners.min(axis=0), atol=1e-12)
+        assert np.allclose(boxes.box[root[body], 3:], corners.max(axis=0), atol=1e-12)
+        assert (rough[body, 0::2] <= boxes.invariant[root[body], 0::2] + 1e-12).all()
+        assert (rough[body, 1::2] >= boxes.invariant[root[body], 1::2] - 1e-12).all()
+
+
+def test_only_bodies_near_to_others_are_fitted_and_the_proof_is_the_same():
+    triangle = np.array([[[0, 2, 0], [1, 2, 0], [0, 3, 0.5]]])
+    row = [triangle + np.array([x, 0, 0]) for x in (0, 1.5, 3, 30, 34)]
+    boxes, bodies = new_bodies(row)
+    low, high, pair = 0.0, 0.3, np.zeros(2, dtype=np.int32)
+    turning, resting = np.array([0, 3], dtype=np.int32), np.array([1, 2, 4], dtype=np.int32)
+    result = np.array([2.0, np.inf, 0.0])
+    place(boxes, bodies, np.tile(np.eye(4), (5, 1, 1)))
+    question = turning, resting, low, high, 0.01, 0.001
+    assert prove_pairs(boxes, bodies, *question, result, pair) == DONE
+    assert bodies.fitted.tolist() == [True, True, False, False, False]
+    assert pair.tolist() == [0, 1]
+    everything = fitted_triangles(row)
+    whole = np.array([2.0, np.inf, 0.0])
+    assert prove_pairs(everything, bodies, *question, whole, pair) == DONE
+    assert np.array_equal(result, whole)
+
+
 def test_bounds_hold_the_distances_of_an_independent_sampling():
     rng = np.random.default_rng(7)
 
@@ -175,8 +222,7 @@ def test_bounds_hold_the_distances_of_an_independent_sampling():
     for trial in range(12):
         one = rng.normal(size=(12, 1, 3)) * 3 + rng.normal(size=(12, 3, 3)) * (0.3 + trial % 3)
         two = rng.normal(size=(9, 1, 3)) * 3 + rng.normal(size=(9, 3, 3)) + [0, 0, 4 + trial]
-        boxes, _ = new_box_trees([one, two])
-        refit(boxes, boxes.triangle.copy(), 0, int(boxes.root[-1]))
+        boxes = fitted_triangles([one, two])
         low, high = sorted(rng.uniform(-3, 3, 2))
         high = min(high, low + np.pi)
         moving, still = fcl.CollisionObject(model(one)), fcl.CollisionObject(model(two))

@@ -1,9 +1,10 @@
 """Bounding volume hierarchies: trees of boxes over the triangles of bodies.
 
-They are built once and fitted anew for every axis of rotation (:func:`refit`). Everything is in the
-frame of one hinge: its axis is the z axis. Besides its box each node knows its *invariants*, the
-ranges of four quantities that a turn about the axis does not change: ``z``, the distance ``r`` from
-the axis, ``(z + r) / √2`` and ``(z - r) / √2``.
+They are built once and fitted anew for every axis of rotation, those of a body that is far from all
+others not at all: :func:`place` gives a body's root a box that is large enough, and :func:`fit`
+fits its tree. Everything is in the frame of one hinge: its axis is the z axis. Besides its box each
+node knows its *invariants*, the ranges of four quantities that a turn about the axis does not
+change: ``z``, the distance ``r`` from the axis, ``(z + r) / √2`` and ``(z - r) / √2``.
 """
 
 # mypy: disallow-untyped-decorators=False, disable-error-code="no-any-return"
@@ -16,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["BoxTrees", "build_tree", "new_box_trees", "refit"]
+__all__ = ["BoxTrees", "PlacedBodies", "build_tree", "fit", "new_bodies", "place"]
 
 #: Most triangles in a leaf.
 _LEAF = 2
@@ -55,6 +56,27 @@ class BoxTrees(NamedTuple):
     invariant: F64
     triangle: F64
     own_invariant: F64
+
+
+class PlacedBodies(NamedTuple):
+    """Bodies as they were given, where they are now, and whether their trees are fitted to that.
+
+    Attributes
+    ----------
+    triangle : (t, 3, 3) float64 array
+        Corners of each triangle as given, in the order of the leaves.
+    extent : (b, 6) float64 array
+        Smallest x, y, z and largest x, y, z of each body as given.
+    pose : (b, 4, 4) float64 array
+        Rigid transform of each body into the frame of the axis.
+    fitted : (b,) bool array
+        Whether all nodes of a body are fitted; else its root's box is only large enough.
+    """
+
+    triangle: F64
+    extent: F64
+    pose: F64
+    fitted: NDArray[np.bool_]
 
 
 @njit(cache=True)
@@ -132,8 +154,8 @@ def build_tree(triangle: F64) -> tuple[I32, I32, I32]:
     return order, child[:nodes].copy(), part[:nodes].copy()
 
 
-def new_box_trees(meshes: list[F64]) -> tuple[BoxTrees, I32]:
-    """Build the trees of several bodies, boxes not yet fitted.
+def new_bodies(meshes: list[F64]) -> tuple[BoxTrees, PlacedBodies]:
+    """Build the trees of several bodies, which are where they were given.
 
     Parameters
     ----------
@@ -143,13 +165,13 @@ def new_box_trees(meshes: list[F64]) -> tuple[BoxTrees, I32]:
     Returns
     -------
     boxes : BoxTrees
-        Triangles where they are, in the order of the leaves; to be fitted by :func:`refit`.
-    owner : (t,) int32 array
-        Body of each triangle.
+        Not fitted yet.
+    bodies : PlacedBodies
+        To be placed by :func:`place`.
     """
-    roots, children, parts, triangles, owners = [0], [], [], [], []
+    roots, children, parts, triangles, extents = [0], [], [], [], []
     nodes = corners = 0
-    for body, triangle in enumerate(meshes):
+    for triangle in meshes:
         order, child, part = build_tree(np.ascontiguousarray(triangle, dtype=np.float64))
         child[child >= 0] += nodes
         part[:, 0] += corners
@@ -159,17 +181,64 @@ def new_box_trees(meshes: list[F64]) -> tuple[BoxTrees, I32]:
         children.append(child)
         parts.append(part)
         triangles.append(triangle[order])
-        owners.append(np.full(len(triangle), body, dtype=np.int32))
+        extents.append((*triangle.min(axis=(0, 1)), *triangle.max(axis=(0, 1))))
+    given = np.ascontiguousarray(np.concatenate(triangles), dtype=np.float64)
     boxes = BoxTrees(
         np.array(roots, dtype=np.int32),
         np.concatenate(children),
         np.concatenate(parts),
         np.zeros((nodes, 6)),
         np.zeros((nodes, 8)),
-        np.ascontiguousarray(np.concatenate(triangles), dtype=np.float64),
+        given.copy(),
         np.zeros((corners, 8)),
     )
-    return boxes, np.concatenate(owners)
+    bodies = PlacedBodies(
+        given,
+        np.array(extents, dtype=np.float64),
+        np.tile(np.eye(4), (len(meshes), 1, 1)),
+        np.zeros(len(meshes), dtype=np.bool_),
+    )
+    place(boxes, bodies, bodies.pose.copy())
+    return boxes, bodies
+
+
+def place(boxes: BoxTrees, bodies: PlacedBodies, pose: F64) -> None:
+    """Move bodies; their roots get boxes and invariants that are large enough.
+
+    Parameters
+    ----------
+    boxes, bodies
+        In and out.
+    pose : (b, 4, 4) float64 array
+        Rigid transform of each body into the frame of the axis.
+    """
+    bodies.pose[:] = pose
+    bodies.fitted[:] = False
+    middle = (bodies.extent[:, :3] + bodies.extent[:, 3:]) / 2
+    half = (bodies.extent[:, 3:] - bodies.extent[:, :3]) / 2
+    turn = pose[:, :3, :3]
+    middle = np.einsum("bij,bj->bi", turn, middle) + pose[:, :3, 3]
+    half = np.einsum("bij,bj->bi", np.abs(turn), half) * (1 + 1e-12)
+    low, high = middle - half, middle + half
+    root = boxes.root[:-1]
+    boxes.box[root] = np.concatenate((low, high), axis=1)
+    z0, z1 = low[:, 2], high[:, 2]
+    r0 = np.linalg.norm(np.maximum(0.0, np.maximum(low, -high))[:, :2], axis=1)
+    r1 = np.linalg.norm(np.maximum(-low, high)[:, :2], axis=1)
+    share = np.sqrt(0.5)
+    boxes.invariant[root] = np.stack(
+        (
+            z0,
+            z1,
+            r0,
+            r1,
+            share * (z0 + r0),
+            share * (z1 + r1),
+            share * (z0 - r1),
+            share * (z1 - r0),
+        ),
+        axis=1,
+    )
 
 
 @njit(cache=True)
@@ -197,20 +266,22 @@ def _axis_distance(triangle: F64) -> float:
 
 
 @njit(cache=True)
-def refit(boxes: BoxTrees, triangle: F64, first: int, last: int) -> None:
-    """Fit the boxes and invariants of some nodes to moved triangles.
+def fit(boxes: BoxTrees, bodies: PlacedBodies, body: int) -> None:
+    """Fit the boxes and invariants of a body's nodes to where it is, where they are not.
 
     Parameters
     ----------
-    boxes : BoxTrees
+    boxes, bodies
         In and out.
-    triangle : (t, 3, 3) float64 array
-        Corners in the frame of the axis, in the order of the leaves.
-    first, last : int
-        Nodes ``first`` to ``last - 1`` are fitted; they are those of whole bodies.
+    body : int
+        Number of the body.
     """
+    if bodies.fitted[body]:
+        return
+    bodies.fitted[body] = True
+    pose = bodies.pose[body]
     half = np.sqrt(0.5)
-    for node in range(last - 1, first - 1, -1):
+    for node in range(boxes.root[body + 1] - 1, boxes.root[body] - 1, -1):
         box = boxes.box[node]
         invariant = boxes.invariant[node]
         box[:3] = np.inf
@@ -229,8 +300,11 @@ def refit(boxes: BoxTrees, triangle: F64, first: int, last: int) -> None:
             continue
         begin = boxes.leaf[node, 0]
         for t in range(begin, begin + boxes.leaf[node, 1]):
-            corner = triangle[t]
-            boxes.triangle[t] = corner
+            corner = boxes.triangle[t]
+            for i in range(3):
+                x, y, z = bodies.triangle[t, i]
+                for j in range(3):
+                    corner[i, j] = pose[j, 0] * x + pose[j, 1] * y + pose[j, 2] * z + pose[j, 3]
             own = boxes.own_invariant[t]
             own[0::2] = np.inf
             own[1::2] = -np.inf

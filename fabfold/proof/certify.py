@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from fabfold.fold.motion import Motion, end_pose_error
 from fabfold.joinery.barrel_sweeps import descendants, lighter_sides
 from fabfold.meshes import mesh_volume
 from fabfold.progress import Progress, SilentProgress
-from fabfold.proof.bvh import BoxTrees, new_box_trees, refit
+from fabfold.proof.bvh import BoxTrees, PlacedBodies, new_bodies, place
 from fabfold.proof.gap import FAILED, UNPROVEN, prove_gap, prove_pairs
 from fabfold.tree.fold_tree import FoldTree
 
@@ -46,18 +46,16 @@ def _frame(point: F64, direction: F64) -> F64:
 
 @dataclass
 class _Bodies:
-    """All bodies' triangles in shape A, and the boxes over them.
+    """All bodies' triangles in shape A in mm, and the boxes over them.
 
     Attributes
     ----------
     names : tuple of b str
         Names of the bodies.
     boxes : BoxTrees
-        Trees over the triangles, fitted to where they were last placed.
-    triangle : (t, 3, 3) float64 array
-        Corners in mm in shape A, in the order of the leaves.
-    owner : (t,) int32 array
-        Body of each triangle, ascending.
+        Trees over the triangles.
+    placed : PlacedBodies
+        The triangles, and where the bodies were last placed.
     voxel_mm : float
         Side of a voxel in mm.
     origin_mm : (3,) float64 array
@@ -66,8 +64,7 @@ class _Bodies:
 
     names: tuple[str, ...]
     boxes: BoxTrees
-    triangle: F64
-    owner: I32
+    placed: PlacedBodies
     voxel_mm: float
     origin_mm: F64
 
@@ -77,16 +74,6 @@ class _Bodies:
         turn = pose[..., :3, :3]
         out[..., :3, 3] = self.voxel_mm * pose[..., :3, 3] + self.origin_mm - turn @ self.origin_mm
         return out
-
-    def place(self, pose_mm: F64) -> None:
-        """Fit the boxes with body ``i`` moved by ``pose_mm[i]``, (b, 4, 4)."""
-        placed = np.empty_like(self.triangle)
-        starts = np.searchsorted(self.owner, np.arange(len(pose_mm) + 1))
-        # Body by body: a transform for each triangle takes five times as long.
-        for pose, (first, last) in zip(pose_mm, pairwise(starts.tolist()), strict=True):
-            turned = np.einsum("ij,tcj->tci", pose[:3, :3], self.triangle[first:last])
-            placed[first:last] = turned + pose[:3, 3]
-        refit(self.boxes, placed, 0, int(self.boxes.root[-1]))
 
 
 def _load(
@@ -104,11 +91,9 @@ def _load(
         if len(corners) == 0 or not np.isfinite(corners).all():
             raise CheckError(f"{body.name}: its mesh is empty or has corners that are no numbers")
         triangles.append(corners)
-    boxes, owner = new_box_trees(triangles)
+    boxes, placed = new_bodies(triangles)
     names = tuple(body.name for body in tree.bodies)
-    return _Bodies(
-        names, boxes, boxes.triangle.copy(), owner, float(voxel_mm), np.array(origin_mm, float)
-    )
+    return _Bodies(names, boxes, placed, float(voxel_mm), np.array(origin_mm, float))
 
 
 def _inside(point: F64, triangle: F64) -> bool:
@@ -250,10 +235,12 @@ def certify(
 
     progress.update(0.0, "measuring the gaps in shape A")
     poses = tree.body_poses(motion.angles_deg[0])
-    bodies.place(bodies.in_mm(poses))
+    place(bodies.boxes, bodies.placed, bodies.in_mm(poses))
     pair = np.zeros(2, dtype=np.int32)
     result = np.array([ceiling, np.inf, 0.0])
-    verdict = prove_pairs(bodies.boxes, everyone, everyone, 0.0, 0.0, wanted, 1e-6, result, pair)
+    verdict = prove_pairs(
+        bodies.boxes, bodies.placed, everyone, everyone, 0.0, 0.0, wanted, 1e-6, result, pair
+    )
     _refuse(verdict, _START, bodies, pair, result, min_gap_mm)
     _check_nesting(bodies.names, meshes)
     seen = float(result[0])
@@ -288,7 +275,7 @@ def certify(
             f"the path ends {error:.2g} voxels away from shape B; plan the folding path again"
         )
     progress.update(1.0, f"least gap {proven:.3f} mm")
-    count = len(bodies.triangle)
+    count = len(bodies.placed.triangle)
     return {
         "geometry": (
             f"printed bodies with hinges, {len(meshes)} bodies of {count} triangles together; "
@@ -404,7 +391,7 @@ def _move(
     point = parent[:3, :3] @ np.array(axis.point) + parent[:3, 3]
     direction = parent[:3, :3] @ np.array(axis.direction, dtype=float)
     frame = _frame(point * bodies.voxel_mm + bodies.origin_mm, direction)
-    bodies.place(frame @ bodies.in_mm(poses))
+    place(bodies.boxes, bodies.placed, frame @ bodies.in_mm(poses))
     inside = descendants(tree)[hinge]
     turning = np.flatnonzero(inside).astype(np.int32)
     resting = np.flatnonzero(~inside).astype(np.int32)
@@ -414,7 +401,16 @@ def _move(
     for part in range(parts):
         ends = sorted(math.radians(turn_deg) * share / parts for share in (part, part + 1))
         verdict = prove_pairs(
-            bodies.boxes, turning, resting, ends[0], ends[1], wanted, slack, result, pair
+            bodies.boxes,
+            bodies.placed,
+            turning,
+            resting,
+            ends[0],
+            ends[1],
+            wanted,
+            slack,
+            result,
+            pair,
         )
         _refuse(verdict, where, bodies, pair, result, asked)
     return result

@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabfold.proof.bvh import BoxTrees
+from fabfold.proof.bvh import BoxTrees, PlacedBodies, fit
 from fabfold.proof.triangles import plane_gap, triangle_distance
 
 __all__ = ["DONE", "FAILED", "UNPROVEN", "prove_gap", "prove_pairs"]
@@ -220,7 +220,22 @@ def _triangles(  # noqa: PLR0912, PLR0915 - one proof, its cases in order of cos
 
 
 @njit(cache=True)
-def prove_gap(  # noqa: PLR0915 - one traversal
+def _node_gap(boxes: BoxTrees, a: int, b: int, begin: float, end: float, goal: float) -> float:
+    """Lower bound of the gap of two nodes; what costs more is left out once it reaches `goal`."""
+    bound = _invariant_gap(boxes.invariant[a], boxes.invariant[b])
+    if bound < goal:
+        c0 = np.cos(begin)
+        s0 = np.sin(begin)
+        c1 = np.cos(end)
+        s1 = np.sin(end)
+        bound = max(bound, _swept_box_gap(boxes.box[a], boxes.box[b], c0, s0, c1, s1))
+        if bound < goal and end > begin:
+            bound = max(bound, _swept_box_gap(boxes.box[b], boxes.box[a], c1, -s1, c0, -s0))
+    return bound
+
+
+@njit(cache=True)
+def prove_gap(
     boxes: BoxTrees, moving: int, still: int, low: float, high: float, wanted: float, slack: float,
     result: F64,
 ) -> int:  # fmt: skip
@@ -264,15 +279,7 @@ def prove_gap(  # noqa: PLR0915 - one traversal
         begin = span[depth, 0]
         end = span[depth, 1]
         goal = max(wanted, result[0] - slack)
-        bound = _invariant_gap(boxes.invariant[a], boxes.invariant[b])
-        if bound < goal:
-            c0 = np.cos(begin)
-            s0 = np.sin(begin)
-            c1 = np.cos(end)
-            s1 = np.sin(end)
-            bound = max(bound, _swept_box_gap(boxes.box[a], boxes.box[b], c0, s0, c1, s1))
-            if bound < goal and end > begin:
-                bound = max(bound, _swept_box_gap(boxes.box[b], boxes.box[a], c1, -s1, c0, -s0))
+        bound = _node_gap(boxes, a, b, begin, end, goal)
         if bound >= goal:
             result[1] = min(result[1], bound)
             continue
@@ -321,15 +328,15 @@ def prove_gap(  # noqa: PLR0915 - one traversal
 
 @njit(cache=True)
 def prove_pairs(
-    boxes: BoxTrees, moving: I32, still: I32, low: float, high: float, wanted: float, slack: float,
-    result: F64, pair: I32,
+    boxes: BoxTrees, bodies: PlacedBodies, moving: I32, still: I32, low: float, high: float,
+    wanted: float, slack: float, result: F64, pair: I32,
 ) -> int:  # fmt: skip
     """Prove that every turning body keeps a gap from every still one.
 
     Parameters
     ----------
-    boxes : BoxTrees
-        Fitted in the frame of the axis.
+    boxes, bodies : BoxTrees, PlacedBodies
+        Placed in the frame of the axis. The trees of those that are near to others are fitted.
     moving, still : (m,), (s,) int32 arrays
         Bodies; a body in both is not paired with itself or twice with another.
     low, high, wanted, slack, result
@@ -347,6 +354,13 @@ def prove_pairs(
             if a == b or (low == high and a > b):
                 continue
             seen = result[0]
+            goal = max(wanted, seen - slack)
+            bound = _node_gap(boxes, boxes.root[a], boxes.root[b], low, high, goal)
+            if bound >= goal:
+                result[1] = min(result[1], bound)
+                continue
+            fit(boxes, bodies, a)
+            fit(boxes, bodies, b)
             verdict = prove_gap(boxes, a, b, low, high, wanted, slack, result)
             if verdict != DONE or result[0] < seen:
                 pair[0] = a

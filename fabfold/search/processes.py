@@ -28,7 +28,7 @@ PATIENCE = 5.0
 #: Seconds that a worker on standby waits for its first seed before it ends.
 STANDBY = 60.0
 #: How far workers step back where there are fewer cores than processes.
-_NICE = 10
+_NICE = 5
 
 
 class InProcessExecutor:
