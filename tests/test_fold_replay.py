@@ -54,6 +54,22 @@ def test_a_fold_into_the_parent_is_felt():
     assert 6 * 600 + 200 <= report.steps <= 6 * 600 + 3 * 200
 
 
+def test_a_long_arm_does_not_lag_behind():
+    tree = joinery_models.strip_tree(48, [1], run=24)
+    meshes = [
+        joinery_models.box_mesh(
+            np.array(ORIGIN) + 10 * np.array([24 * b - 0.5, -0.5, -0.5]) + 0.15,
+            np.array(ORIGIN) + 10 * np.array([24 * b + 23.5, 0.5, 0.5]) - 0.15,
+        )
+        for b in range(2)
+    ]
+    motion = motion_of(tree, np.array([[0, 2]]))
+    report = replay(tree, motion, meshes, 10.0, ORIGIN)
+    assert report.contact_steps == 0
+    assert report.max_lag_deg < 0.4
+    assert report.max_angle_error_deg < 0.01
+
+
 def test_boxes_hold_the_material_of_each_cell():
     tree, meshes = kit()
     boxes = material_boxes(tree, meshes, 10.0, ORIGIN, 0.3)

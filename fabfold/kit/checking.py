@@ -100,7 +100,14 @@ def run_checks(built: BuiltTree, mode: PrintMode, progress: Progress) -> list[Ch
     checks += _sampled(built, profile)
     progress.update(0.8, "replay in MuJoCo")
     meshes = [(body.vertices, body.faces) for body in joinery.bodies]
-    report = replay(tree, motion, meshes, voxel_mm=joinery.voxel_mm, origin_mm=joinery.origin_mm)
+    report = replay(
+        tree,
+        motion,
+        meshes,
+        voxel_mm=joinery.voxel_mm,
+        origin_mm=joinery.origin_mm,
+        seconds_per_quarter=2.0,
+    )
     checks += [
         Check(
             name="replay: deepest penetration",

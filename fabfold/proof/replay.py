@@ -1,10 +1,17 @@
 """The folding path rehearsed in a physics simulator (MuJoCo), as a maker's hands would fold.
 
 Motors turn the hinges along the path, contacts push back, and the report says how far bodies were
-pressed into each other and how far the hinges lagged behind. This is a rehearsal, not a proof, and
-not independent of it: each body is a set of boxes, the boxes of neighbouring cells are as far apart
-as the certificate says, and which cells are only seen by their cores comes from the planner. The
-proof is :mod:`fabfold.proof.certify`, the independent opinion :mod:`fabfold.proof.sampled`.
+pressed into each other and how far the hinges lagged behind. The motors know what the bodies weigh:
+hands are slow, and what lags shall do so since something is in its way, not since a long arm is
+heavy. This is a rehearsal, not a proof, and not independent of it: each body is a set of boxes, the
+boxes of neighbouring cells are as far apart as the certificate says, and which cells are only seen
+by their cores comes from the planner. The proof is :mod:`fabfold.proof.certify`, the independent
+opinion :mod:`fabfold.proof.sampled`.
+
+References
+----------
+Siciliano, Sciavicco, Villani, Oriolo: Robotics (2009), section 8.5.2, for the torque that a course
+asks for.
 """
 
 from __future__ import annotations
@@ -237,7 +244,7 @@ def replay(
     Each body is a set of boxes, one about its material in each cell (hinge barrels that stand out
     of the cell are not simulated); a link plate is a sheet between them. The root body is held; a
     position motor on every hinge follows the path, speeding up and slowing down smoothly in every
-    move.
+    move; it is given the torque that the bodies' inertia asks for.
 
     Parameters
     ----------
@@ -273,7 +280,8 @@ def replay(
         motor=Motor(_GAIN, _BRAKE),
     )  # fmt: skip
     data = mujoco.MjData(model)
-    joint, _ = hinge_joints(model, tree)
+    mujoco.mj_forward(model, data)
+    joint, dof = hinge_joints(model, tree)
     motor = np.array([model.actuator(h.name).id for h in tree.hinges], dtype=int)
 
     worst = lag = 0.0
@@ -281,9 +289,17 @@ def replay(
     touching = steps = 0
     moves = len(motion.moves) - 1
 
-    def step(wanted: F64) -> None:
-        nonlocal steps, touching, deepest
-        data.ctrl[motor] = wanted
+    still = before = np.zeros(len(dof))
+    acceleration, torque = np.zeros(model.nv), np.zeros(model.nv)
+
+    def step(wanted: F64, rate: F64) -> None:
+        nonlocal steps, touching, deepest, before
+        acceleration[dof] = (rate - before) / _TIME_STEP
+        before = rate
+        mujoco.mj_mulM(model, data, torque, acceleration)
+        data.qfrc_applied[:] = torque + data.qfrc_bias
+        # The motor brakes by its own damping; ask for a little more, to be there on time.
+        data.ctrl[motor] = wanted + rate * (_BRAKE + _DAMPING) / _GAIN
         mujoco.mj_step(model, data)
         steps += 1
         if data.ncon:
@@ -297,13 +313,12 @@ def replay(
         if rate is None:
             until = steps + round(_HOLD_S / _TIME_STEP)
             while error(goal) > np.radians(_AT_REST_DEG) and steps < until:
-                step(goal)
+                step(goal, still)
             worst = max(worst, error(goal))
             require_finite(data, f"move {number} of {moves}")
             progress.update(number / moves, f"replayed move {number} of {moves}")
             continue
-        # The motor brakes by its own damping; ask for a little more, to be there on time.
-        step(goal + rate * (_BRAKE + _DAMPING) / _GAIN)
+        step(goal, rate)
         lag = max(lag, error(goal))
     angles = np.degrees(data.qpos[joint])
     progress.update(1.0, f"deepest contact {deepest * voxel_mm:.3f} mm")
