@@ -15,7 +15,6 @@ from fabfold.joinery.cells import as_manifold, eroded_cells, occupancy
 from fabfold.joinery.grooves import groove_tools
 from fabfold.joinery.hinge_placement import hinge_frames
 from fabfold.joinery.soundness import (
-    crossing_triangles,
     mesh_faults,
     piece_count,
     printable_body,
@@ -23,6 +22,7 @@ from fabfold.joinery.soundness import (
 )
 from fabfold.lattice.rotations import rotation_about
 from fabfold.meshes import mesh_volume
+from fabfold.solid.crossing import crossing_triangles
 
 CELLS = {
     "one": [[0, 0, 0]],

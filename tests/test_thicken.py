@@ -6,6 +6,7 @@ import manifold3d
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 from typer.testing import CliRunner
 from voxel_cases import material_voxels
 
@@ -18,6 +19,8 @@ from fabfold.meshes import is_closed
 from fabfold.recipe.recipe import make_recipe
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.convert import to_manifold, to_mesh
+from fabfold.solid.crossing import crossing_triangles
+from fabfold.solid.round_solid import round_solid
 from fabfold.solid.thicken import inner_balls, thickened
 from fabfold.voxels.features import features
 from fabfold.voxels.thickening import STEPS, cut_thick, scarce_hinges
@@ -46,6 +49,30 @@ def bars():
     material = np.zeros((2, 20, 20, 20), dtype=bool)
     material[:, :, 7:13, 7:13] = True
     return material_voxels([(0, 0, 0), (1, 0, 0)], material)
+
+
+@pytest.mark.parametrize(("degrees", "tilt"), [(35, 0.3), (17, 0.95), (20, 0.26), (18, 0.97)])
+def test_the_solid_about_struts_that_meet_is_smooth_and_does_not_cross_itself(degrees, tilt):
+    along = np.arange(0, 30, 0.2)[:, None]
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    struts = np.array(
+        [
+            [1, 0, 0],
+            [cosine, sine * np.cos(tilt), sine * np.sin(tilt)],
+            [cosine, -sine * np.sin(tilt), sine * np.cos(tilt)],
+        ]
+    )
+    centres = np.concatenate([along * strut for strut in struts])
+    made = round_solid(centres, 1.0)
+    vertices, faces = to_mesh(made)
+    assert len(crossing_triangles(vertices, faces)) == 0
+    assert len(faces) < 4000
+    # Between the points of a strut, a tenth apart, the surface of their balls is 0.005 deep.
+    away, _ = cKDTree(centres).query(vertices)
+    assert away.min() > 0.88
+    assert np.abs(away - 1.0).mean() < 0.03
+    # Narrow slits, where struts part, are bridged.
+    assert np.quantile(away, 0.98) < 1.11
 
 
 def test_balls_between_two_faces_have_half_their_distance_as_radius():

@@ -13,16 +13,13 @@ from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
 from fabfold.meshes import compact, weld
-from fabfold.solid.crossing import really_crossing
+from fabfold.solid.crossing import crossing_triangles
 
 if TYPE_CHECKING:
     import manifold3d
-    import pymeshlab
 
 __all__ = [
-    "crossing_triangles",
     "mesh_faults",
-    "meshlab_set",
     "piece_count",
     "piece_of_vertices",
     "printable_body",
@@ -112,56 +109,6 @@ def mesh_faults(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDAr
     vertex, fans = np.unique(pairs[:, 0], return_counts=True)
     split = vertex[fans > 1].astype(np.int64)
     return np.stack([split, split], axis=1)
-
-
-def crossing_triangles(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32]
-) -> NDArray[np.int64]:
-    """Triangles of a mesh that cross others: of those that MeshLab finds, the ones that really do.
-
-    Parameters
-    ----------
-    vertices : (v, 3) float64 array
-        Corners of the mesh.
-    faces : (f, 3) int32 array
-        Triangles as indices into `vertices`.
-
-    Returns
-    -------
-    (k,) int64 array
-        Their indices; empty for a surface that is a plain solid's.
-    """
-    meshes = meshlab_set(vertices, faces)
-    meshes.compute_selection_by_self_intersections_per_face()
-    found = np.flatnonzero(meshes.current_mesh().face_selection_array()).astype(np.int64)
-    return really_crossing(vertices, faces, found)
-
-
-def meshlab_set(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> pymeshlab.MeshSet:
-    """A mesh as MeshLab takes it.
-
-    Parameters
-    ----------
-    vertices : (v, 3) float64 array
-        Corners of the mesh.
-    faces : (f, 3) int32 array
-        Triangles as indices into `vertices`.
-
-    Returns
-    -------
-    pymeshlab.MeshSet
-        With this one mesh.
-    """
-    import pymeshlab
-
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(
-        pymeshlab.Mesh(
-            np.ascontiguousarray(vertices, dtype=np.float64),
-            np.ascontiguousarray(faces, dtype=np.int32),
-        )
-    )
-    return meshes
 
 
 def piece_of_vertices(count: int, faces: NDArray[np.integer[Any]]) -> NDArray[np.int32]:

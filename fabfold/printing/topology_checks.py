@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from fabfold.joinery.bodies import BodyMesh
-from fabfold.joinery.soundness import crossing_triangles, meshlab_set
 from fabfold.printing.checks import Check
 from fabfold.progress import Progress
+from fabfold.solid.convert import to_mesh_set
+from fabfold.solid.crossing import crossing_triangles
 
 __all__ = ["check_topology"]
 
@@ -33,7 +34,7 @@ def check_topology(bodies: Sequence[BodyMesh], progress: Progress) -> list[Check
     opened, branching, pieces, crossing = [], [], [], []
     for index, body in enumerate(bodies):
         progress.update(0.4 * index / len(names), f"mesh of {body.name}")
-        meshes = meshlab_set(body.vertices, body.faces)
+        meshes = to_mesh_set(body.vertices, body.faces)
         measures = meshes.get_topological_measures()
         opened.append(int(measures["boundary_edges"]))
         branching.append(_shared_edges(body) + int(measures["non_two_manifold_vertices"]))

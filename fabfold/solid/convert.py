@@ -63,14 +63,14 @@ def to_mesh(manifold: manifold3d.Manifold) -> tuple[Points, Faces]:
     )
 
 
-def to_mesh_set(vertices: Points, faces: Faces) -> Any:
+def to_mesh_set(vertices: Points, faces: NDArray[np.integer[Any]]) -> Any:
     """Make a pymeshlab.MeshSet with one mesh.
 
     Parameters
     ----------
     vertices : (v, 3) float64 array
         Corner coordinates, in any unit.
-    faces : (f, 3) int64 array
+    faces : (f, 3) integer array
         Three vertex indices for each triangle.
 
     Returns

@@ -15,12 +15,37 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["really_crossing"]
+from fabfold.solid.convert import to_mesh_set
+
+__all__ = ["crossing_triangles", "really_crossing"]
 
 #: A determinant above this share of the product of its lengths has the sign that floats give it.
 _SURE = 1e-12
 
 Point = Sequence[float]
+
+
+def crossing_triangles(
+    vertices: NDArray[np.float64], faces: NDArray[np.integer[Any]]
+) -> NDArray[np.int64]:
+    """Triangles of a mesh that cross others: of those that MeshLab finds, the ones that really do.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64 array
+        Corners of the mesh.
+    faces : (f, 3) integer array
+        Triangles as indices into `vertices`.
+
+    Returns
+    -------
+    (k,) int64 array
+        Their indices; empty for a surface that is a plain solid's.
+    """
+    meshes = to_mesh_set(vertices, faces)
+    meshes.compute_selection_by_self_intersections_per_face()
+    found = np.flatnonzero(meshes.current_mesh().face_selection_array()).astype(np.int64)
+    return really_crossing(vertices, faces, found)
 
 
 def really_crossing(

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from fabfold.solid.closed_solid import Solid
 from fabfold.solid.convert import decimated, to_manifold, to_mesh
 from fabfold.solid.own_axes import own_axes
+from fabfold.solid.round_solid import round_solid
 from fabfold.solid.union import MAX_TRIANGLES
 
 if TYPE_CHECKING:
@@ -49,12 +50,6 @@ _GROWTH = 0.45
 #: Balls are compared with those of so many sizes, each smaller by this factor.
 _SIZES = 26
 _STEP = 0.89
-#: Spacing of the grid for the new surface, in wanted half thicknesses, as long as it has at most so
-#: many points.
-_GRID = 0.3
-_MOST_POINTS = 450_000
-#: The new surface is simplified within this share of the wanted half thickness.
-_SIMPLIFY = 0.04
 
 
 @dataclass(frozen=True)
@@ -169,7 +164,7 @@ def thickened(solid: Solid, thickness: float) -> Thickened:
     if not thin.any():
         return Thickened(given, float("inf"), 0.0)
     centres = _spread(balls.centres[thin], radius / 5)
-    skin = _round_solid(centres, radius)
+    skin = round_solid(centres, radius)
     whole = _filled(to_manifold(solid.vertices, solid.faces) + skin)
     scale = float(np.ptp(solid.vertices, axis=0).max())
     whole = decimated(whole.scale((1 / scale,) * 3), MAX_TRIANGLES).scale((scale,) * 3)
@@ -257,41 +252,6 @@ def _least(centres: Floats, radii: Floats, radius: float) -> float:
     np.maximum.at(largest, owner, radii)
     places = largest[owner]  # A place counts by its samples: a corner of a cube has few.
     return float(np.quantile(places, 0.05))
-
-
-def _round_solid(centres: Floats, radius: float) -> manifold3d.Manifold:
-    """All that is within `radius` of one of the centres (n, 3)."""
-    import manifold3d
-    from scipy.spatial import cKDTree
-
-    low, high = centres.min(axis=0) - 1.5 * radius, centres.max(axis=0) + 1.5 * radius
-    step = max(_GRID * radius, float(np.cbrt(np.prod(high - low) / _MOST_POINTS)))
-    shape = np.ceil((high - low) / step).astype(int) + 2
-    axes = [low[axis] + step * np.arange(shape[axis]) for axis in range(3)]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    reach = radius + 2 * step
-    gap, _ = cKDTree(centres).query(grid, distance_upper_bound=reach)
-    field = (radius - np.minimum(gap, reach)).reshape(shape)
-    table = field.tolist()
-    x0, y0, z0 = low.tolist()
-    inverse = 1.0 / step
-
-    def depth(x: float, y: float, z: float) -> float:
-        x, y, z = (x - x0) * inverse, (y - y0) * inverse, (z - z0) * inverse
-        i, j, k = int(x), int(y), int(z)
-        x, y, z = x - i, y - j, z - k
-        one, other = table[i], table[i + 1]
-        a, b, c, d = one[j], one[j + 1], other[j], other[j + 1]
-        one_low = a[k] + z * (a[k + 1] - a[k])
-        one_high = b[k] + z * (b[k + 1] - b[k])
-        other_low = c[k] + z * (c[k + 1] - c[k])
-        other_high = d[k] + z * (d[k + 1] - d[k])
-        near = one_low + y * (one_high - one_low)
-        return float(near + x * (other_low + y * (other_high - other_low) - near))
-
-    inner = [*(low + 0.2 * step), *(high - 0.2 * step)]
-    skin = manifold3d.Manifold.level_set(depth, inner, 1.2 * step)
-    return skin.simplify(_SIMPLIFY * radius)
 
 
 def _filled(body: manifold3d.Manifold) -> manifold3d.Manifold:

@@ -73,7 +73,7 @@ def unlike(
     for grid in found:
         if len(chosen) == count:
             break
-        if grid.fit.excess > 0:
+        if grid.fit.excess > 0 or grid.fit.kept == 0:
             continue
         others = by_size.setdefault(grid.fit.kept, [])
         if others and np.abs(np.array(others) - grid.fit.fills).mean(axis=1).min() < _SAME_FILL:
