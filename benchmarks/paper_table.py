@@ -152,19 +152,18 @@ def before_table(rows: dict[str, dict[str, Any]]) -> list[str]:
         return []
     lines = [
         "",
-        "This version and 0.1 one after the other on the same machine: processor seconds of the",
-        "whole program, their ratio, and the clock. *Hinges* counts the axes. 0.1 writes no manual",
-        "and no page that plays, and makes fewer checks.",
+        "This version, as of the last run with `--before`, and 0.1 right after it on the same",
+        "machine: processor seconds of the whole program, their ratio, and the clock. *Hinges*",
+        "counts the axes. 0.1 writes no manual and no page that plays, and makes fewer checks.",
         "",
         "| model | all | 0.1 | ratio | clock | 0.1 | energy | 0.1 | hinges | 0.1 |",
         "|---|" + "--:|" * 9,
     ]
     for name, row in both.items():
-        old = row["before"]
-        new, was = row["cpu"], old["cpu"]
-        cells = [f"{new:.1f}", f"{was:.1f}", f"{new / was:.2f}"]
-        cells += [f"{row['total']:.1f}", f"{old['total']:.1f}"]
-        sides = [_facts(row), _facts(old)]
+        new, old = row["before"]["beside"], row["before"]
+        cells = [f"{new['cpu']:.1f}", f"{old['cpu']:.1f}", f"{new['cpu'] / old['cpu']:.2f}"]
+        cells += [f"{new['total']:.1f}", f"{old['total']:.1f}"]
+        sides = [_facts(new), _facts(old)]
         cells += [side[0] for side in sides] + [side[1] for side in sides]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return lines
@@ -286,7 +285,10 @@ def main() -> None:
                 bad = [line for line in verdict.stdout.splitlines() if line.startswith("FAIL")]
                 row["verify"] = "passes" if verdict.returncode == 0 else "; ".join(bad) or "died"
         if old_version is not None:
-            row["before"] = old_version.row(source, template)
+            beside = {key: row[key] for key in ("cpu", "total", "summary") if key in row}
+            row["before"] = {**old_version.row(source, template), "beside": beside}
+        elif "before" in rows.get(name, {}):
+            row["before"] = rows[name]["before"]
         rows[name] = row
         print(
             f"{name}: exit {row['exit']}, {row['total']:.1f} s", row.get("verify", ""), flush=True
