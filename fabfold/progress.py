@@ -7,13 +7,26 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Protocol
 
-__all__ = ["Listener", "Progress", "SilentListener", "SilentProgress", "processor_seconds"]
+__all__ = [
+    "Listener",
+    "Progress",
+    "SilentListener",
+    "SilentProgress",
+    "children_seconds",
+    "processor_seconds",
+]
+
+
+def children_seconds() -> float:
+    """Processor seconds of the processes that this one started and that have ended."""
+    spent = os.times()
+    return spent.children_user + spent.children_system
 
 
 def processor_seconds() -> float:
-    """Processor seconds of this process and of those that it started and that have ended."""
+    """Processor seconds of this process and of those of :func:`children_seconds`."""
     spent = os.times()
-    return spent.user + spent.system + spent.children_user + spent.children_system
+    return spent.user + spent.system + children_seconds()
 
 
 class Progress(Protocol):

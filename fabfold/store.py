@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,6 +30,7 @@ class StageStore:
 
     A stage is done when the journal holds its key and every file that it wrote still has the
     digest it had then; anything else, a half-finished run or a file changed by hand, is done again.
+    Several threads may use it.
 
     Parameters
     ----------
@@ -56,6 +58,7 @@ class StageStore:
         self._delivered: dict[str, str] = {}
         self._lock: int | None = None
         self._users = 0
+        self._changing = threading.RLock()
         if self.folder is not None:
             self._read(self.folder / "journal.json")
 
@@ -121,19 +124,20 @@ class StageStore:
         KitError
             If another run is at work in the folder.
         """
-        if self.folder is None or self._lock is not None or self._users == 0:
-            return
-        kit = self.folder.parent
-        kit.mkdir(parents=True, exist_ok=True)
-        try:
-            self._lock = _lock_folder(kit)
-        except BlockingIOError:
-            raise KitError(
-                f"{kit}: another run is at work in this folder; wait until it ends, or give "
-                "another folder with --output"
-            ) from None
-        for left in sorted(kit.rglob(".part-*")):
-            left.unlink(missing_ok=True)
+        with self._changing:
+            if self.folder is None or self._lock is not None or self._users == 0:
+                return
+            kit = self.folder.parent
+            kit.mkdir(parents=True, exist_ok=True)
+            try:
+                self._lock = _lock_folder(kit)
+            except BlockingIOError:
+                raise KitError(
+                    f"{kit}: another run is at work in this folder; wait until it ends, or give "
+                    "another folder with --output"
+                ) from None
+            for left in sorted(kit.rglob(".part-*")):
+                left.unlink(missing_ok=True)
 
     def path(self, name: str) -> Path:
         """Path of the file `name` in the store.
@@ -181,11 +185,13 @@ class StageStore:
         """Note that `stage` is done with `key` and wrote `files` (names in the store)."""
         if self.folder is None:
             return
-        self._journal[stage] = {
+        entry = {
             "key": key,
             "files": {name: sha256_of(self.folder / name) for name in sorted(files)},
         }
-        self._write()
+        with self._changing:
+            self._journal[stage] = entry
+            self._write()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -195,9 +201,10 @@ class StageStore:
     def record_names(self, names: Iterable[str]) -> None:
         """Note under which names kits are written into this folder."""
         wanted = sorted(set(names))
-        if self.folder is not None and wanted != self._names:
-            self._names = wanted
-            self._write()
+        with self._changing:
+            if self.folder is not None and wanted != self._names:
+                self._names = wanted
+                self._write()
 
     @property
     def delivered(self) -> dict[str, str]:
@@ -207,8 +214,9 @@ class StageStore:
     def record_delivered(self, digests: dict[str, str]) -> None:
         """Note the digests of files of the exported kit."""
         if self.folder is not None:
-            self._delivered = dict(digests)
-            self._write()
+            with self._changing:
+                self._delivered = dict(digests)
+                self._write()
 
     def _write(self) -> None:
         assert self.folder is not None

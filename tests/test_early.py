@@ -6,6 +6,8 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +15,7 @@ import pytest
 import trimesh
 from stage_listener import StageListener
 
-from fabfold.errors import CheckError, GeometryError, NoFoldError
+from fabfold.errors import CheckError, GeometryError, KitError, NoFoldError
 from fabfold.kit import early as early_module
 from fabfold.kit import first_trees as first_trees_module
 from fabfold.kit.cutting_stage import cut_model
@@ -44,13 +46,14 @@ def begin(bar_kit, monkeypatch, tmp_path):
     monkeypatch.setattr(early_module, "kernel_stamp", lambda: stamp)
     (tmp_path / "kit").mkdir()
 
-    def make(listener=None, mode=None):
+    def make(listener=None, mode=None, claim=lambda: None):
         return EarlyKit(
             bar_kit.recipe,
             bar_kit.template,
             mode or bar_kit.print_mode(),
             tmp_path / "kit",
             lambda: (bar_kit.solid(), bar_kit.wishes()),
+            claim,
             listener or SilentListener(),
         )
 
@@ -64,13 +67,14 @@ def files(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_first_kit_has_bodies_and_the_proof(bar_kit, begin, tmp_path):
-    listener = Listener()
-    with begin(listener) as early:
+def test_a_first_kit_has_bodies_and_the_proof(bar_kit, begin, files, tmp_path):
+    listener, before = Listener(), []
+    with begin(listener, claim=lambda: before.append(files())) as early:
         early.start()
         early.start()
-        early.write()
-        early.wait()
+        early.wait()  # Nobody has to ask for it.
+    assert before == [[]], "the folder is claimed once, before anything is there"
+    assert early.processor_seconds > 0.1
     kit = tmp_path / "kit"
     tree = json.loads((kit / "tree.json").read_text("utf-8"))
     motion = json.loads((kit / "motion.json").read_text("utf-8"))
@@ -157,15 +161,16 @@ def test_a_kit_that_is_there_is_left_alone(begin, files, tmp_path, name):
     (tmp_path / "kit" / name).write_text("{}", "utf-8")
     with begin() as early:
         early.start()
-        early.write()
+        early.search()
         assert early._process is None
     assert files() == [name]
+    assert early.processor_seconds == 0.0
 
 
 def test_nothing_is_made_where_it_is_not_wanted(begin, files):
     with begin() as early:
         early.start(wanted=False)
-        early.write()
+        early.search()
         assert early._process is None
     assert files() == []
 
@@ -177,7 +182,7 @@ def test_it_waits_for_the_kernels(begin, monkeypatch, tmp_path):
         early.start()
         assert early._process is None
         stamp.touch()
-        early.write()
+        early.search()
         assert early._process is not None
 
 
@@ -188,7 +193,6 @@ def test_a_tree_whose_bodies_do_not_come_out_says_why_and_leaves_nothing(bar_kit
     huge = replace(mode, profile=mode.profile.model_copy(update={"clearance_mm": 4.9}))
     with begin(listener, huge) as early:
         early.start()
-        early.write()
         early.wait()
     assert listener.told["early"].startswith("not this time: ")
     assert "Error" not in listener.told["early"]
@@ -213,12 +217,14 @@ def test_the_last_error_is_raised_where_no_tree_can_be_built(bar_kit, tmp_path, 
 
 
 def test_it_ends_where_the_model_cannot_be_cut(begin, files):
-    with pytest.raises(NoFoldError), begin() as early:
+    listener = Listener()
+    with pytest.raises(NoFoldError), begin(listener) as early:
         early.start()
         process = early._process
         assert process.poll() is None
         raise NoFoldError("nothing folds")
     assert process.poll() is not None
+    assert listener.told["early"] == "given up"
     assert files() == []
 
 
@@ -226,7 +232,7 @@ def test_it_is_given_up_once_the_search_is_over(begin, tmp_path):
     listener = Listener()
     with begin(listener) as early:
         early.start()
-        early.write()
+        early.search()
     assert listener.told["early"] == "given up: the search is over"
     assert not list(tmp_path.rglob(".part-*"))
 
@@ -235,6 +241,61 @@ def test_it_is_given_up_once_the_search_is_over(begin, tmp_path):
 def test_it_is_finished_where_the_search_was_stopped(bar_kit, begin, files):
     with pytest.raises(KeyboardInterrupt), begin() as early:
         early.start()
-        early.write()
+        early.search()
         raise KeyboardInterrupt
     assert f"{bar_kit.recipe.name}.3mf" in files()
+
+
+@pytest.mark.slow
+def test_what_is_being_written_is_written_whole(bar_kit, begin, files):
+    claimed = threading.Event()
+    with pytest.raises(KeyboardInterrupt), begin(claim=claimed.set) as early:
+        early.start()
+        assert claimed.wait(timeout=120)
+        raise KeyboardInterrupt  # The model is still being cut.
+    assert f"{bar_kit.recipe.name}.3mf" in files()
+
+
+@pytest.mark.slow
+def test_nothing_is_written_to_a_folder_of_another_run(begin, files):
+    def refuse():
+        raise KitError("another run is at work in this folder")
+
+    listener = Listener()
+    with begin(listener, claim=refuse) as early:
+        early.start()
+        early.wait()
+    assert listener.told["early"] == "not this time: another run is at work in this folder"
+    assert files() == []
+
+
+@pytest.mark.slow
+def test_the_first_kit_is_there_before_the_model_is_cut_well(
+    bar, bar_options, bar_kit, monkeypatch, tmp_path
+):
+    """It does not wait for that, and the folder has the recipe, so that the run can go on."""
+    stamp, folder, there = tmp_path / "kernels.stamp", tmp_path / "kit", []
+    stamp.touch()
+    monkeypatch.setattr(early_module, "kernel_stamp", lambda: stamp)
+    written = threading.Event()
+
+    class Look:
+        @contextmanager
+        def stage(self, name):
+            if name == "voxelize":
+                assert written.wait(timeout=120)
+            yield SilentProgress()
+            if name == "early":
+                there.extend(sorted(path.name for path in folder.iterdir()))
+                written.set()
+
+    kit = Kit.from_model(bar, folder=folder, workers=1, **bar_options)
+    kit.listener = Look()
+    kit.export()
+    assert {"kit.toml", "tree.json", "motion.json", "bodies", "bar.3mf"} <= set(there)
+    assert "report.json" not in there
+    assert (folder / "report.json").is_file()
+    assert kit.processor_seconds["early"] > 0.1
+    assert all(check.ok for check in kit.check())
+    for name in ("tree.json", "motion.json", "bar.3mf"):
+        assert (folder / name).read_bytes() == (bar_kit.folder / name).read_bytes()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -55,6 +56,7 @@ _STAGES = {
     "join": "bodies",
     "check": "checks",
     "export": "files",
+    "early": "first kit",
 }
 
 
@@ -68,7 +70,10 @@ class ConsoleListener:
 
     def __init__(self) -> None:
         self._console = Console(stderr=True)
+        # Stages of several threads share one display, which is there while any of them is open.
         self._bars: RichProgress | None = None
+        self._open = 0
+        self._lock = threading.Lock()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Progress]:
@@ -88,24 +93,33 @@ class ConsoleListener:
                     markup=False,
                     soft_wrap=True,
                 )
-        elif self._bars is not None:
-            with _bar(self._bars, title) as bar:
-                yield bar
         else:
-            columns = (
-                TextColumn("{task.fields[title]:32}"),
-                BarColumn(bar_width=20),
-                TimeElapsedColumn(),
-                TextColumn("{task.description}", markup=False),
-            )
-            try:
-                with (
-                    RichProgress(*columns, console=self._console) as self._bars,
-                    _bar(self._bars, title) as bar,
-                ):
-                    yield bar
-            finally:
-                self._bars = None
+            with self._display() as bars, _bar(bars, title) as bar:
+                yield bar
+
+    @contextmanager
+    def _display(self) -> Iterator[RichProgress]:
+        """The bars of the stages that are open."""
+        with self._lock:
+            if self._bars is None:
+                columns = (
+                    TextColumn("{task.fields[title]:32}"),
+                    BarColumn(bar_width=20),
+                    TimeElapsedColumn(),
+                    TextColumn("{task.description}", markup=False),
+                )
+                self._bars = RichProgress(*columns, console=self._console)
+                self._bars.start()
+            bars = self._bars
+            self._open += 1
+        try:
+            yield bars
+        finally:
+            with self._lock:
+                self._open -= 1
+                if self._open == 0:
+                    bars.stop()
+                    self._bars = None
 
 
 @contextmanager

@@ -10,17 +10,18 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO
 
 from fabfold.child_process import end_with_parent, module_call
-from fabfold.errors import CheckError, GeometryError, NoFoldError
+from fabfold.errors import CheckError, FabfoldError, GeometryError, NoFoldError
 from fabfold.kit.first_trees import first_trees
 from fabfold.kit.stages import BuiltTree, build
 from fabfold.lattice.template import Template
 from fabfold.printing.print_mode import PrintMode
-from fabfold.progress import Listener, SilentProgress
+from fabfold.progress import Listener, SilentProgress, children_seconds
 from fabfold.recipe.recipe import Recipe
 from fabfold.search.kernels import kernel_stamp
 from fabfold.solid.closed_solid import Solid
@@ -38,12 +39,12 @@ _TREES = 3
 class EarlyKit:
     """Cuts a model in haste, takes a tree that folds and builds it, in a process of its own.
 
-    It does so from the moment the model is read, beside cutting it well and searching; and it
-    writes once the search has begun, for then the kit folder is this run's. A thread only waits for
-    it: MeshLab, which looks at the bodies, may not be used in a thread that is not the first. What
-    is written is what a printer needs and the proof that it folds: ``tree.json``, ``motion.json``
-    with its certificate, the bodies and the 3MF. Everything is replaced by the final kit, so it is
-    given up where the search is over sooner. Where no tree can be built, nothing is written.
+    It does so from the moment the model is read, beside cutting it well and searching. A thread
+    only waits for it: MeshLab, which looks at the bodies, may not be used in a thread that is not
+    the first. What is written is what a printer needs and the proof that it folds: ``tree.json``,
+    ``motion.json`` with its certificate, the bodies and the 3MF. Everything is replaced by the
+    final kit, so it is given up where the search is over sooner. Where no tree can be built,
+    nothing is written.
 
     Parameters
     ----------
@@ -57,8 +58,15 @@ class EarlyKit:
         Kit folder; nothing is made where it has a kit.
     model : callable
         Gives the model and the wishes, once they are needed.
+    claim : callable
+        Makes the folder this run's, before anything is written to it; called in another thread.
     listener : Listener
         Shows that the kit is there.
+
+    Attributes
+    ----------
+    processor_seconds : float
+        What its process has cost, once that has ended.
     """
 
     def __init__(
@@ -68,16 +76,19 @@ class EarlyKit:
         mode: PrintMode,
         folder: Path,
         model: Callable[[], tuple[Solid, Wishes]],
+        claim: Callable[[], object],
         listener: Listener,
     ) -> None:
         self._job = recipe, template, mode, folder
-        self._model, self._listener = model, listener
+        self._model, self._claim, self._listener = model, claim, listener
         there = (folder / name for name in ("tree.json", "report.json"))
         self._wanted = not any(path.is_file() for path in there)
-        self._thread: threading.Thread | None = None
-        self._sender: threading.Thread | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._over = False
+        self._threads: list[threading.Thread] = []
+        # Between giving up and claiming the folder only one may come first.
+        self._lock = threading.Lock()
+        self._over = self._claimed = self._searching = False
+        self.processor_seconds = 0.0
 
     def __enter__(self) -> EarlyKit:
         """While it is open, the kit may be made."""
@@ -102,68 +113,78 @@ class EarlyKit:
             command,
             env=environment,
             stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
         )
         # Its modules are loaded before it reads, which nobody shall wait for.
         work = pickle.dumps((*self._job, solid, wishes))
-        self._sender = threading.Thread(target=self._send, args=(self._process, work), daemon=True)
-        self._sender.start()
+        # A daemon, so that Ctrl-C ends the run at once: each file is written whole or not.
+        for task in (partial(_send, self._process, work), partial(self._follow, self._process)):
+            self._threads.append(threading.Thread(target=task, daemon=True))
+            self._threads[-1].start()
 
-    @staticmethod
-    def _send(process: subprocess.Popen[bytes], work: bytes) -> None:
-        assert process.stdin is not None
-        with suppress(BrokenPipeError):  # It ended; `write` says why.
-            process.stdin.write(work)
-            process.stdin.flush()
+    def search(self) -> None:
+        """Begin at the latest now: the search does, and may find nothing before this does."""
+        if not self._over:
+            self.start()
+            self._searching = True
 
-    def write(self) -> None:
-        """Let it write what it has made, or will have made, and say so."""
-        if self._over:
-            return
-        self.start()
-        if self._process is not None and self._thread is None:
-            # A daemon, so that Ctrl-C ends the run at once: each file is written whole or not.
-            self._thread = threading.Thread(target=self._follow, args=(self._process,), daemon=True)
-            self._thread.start()
+    def _follow(self, process: subprocess.Popen[bytes]) -> None:
+        """Let it write once it has something to write, and say what became of it."""
+        assert process.stdin and process.stdout and process.stderr
+        with self._listener.stage("early") as progress:
+            progress.update(None, "cut in haste, beside the good one")
+            trouble = ""
+            if process.stdout.readline():
+                with self._lock:
+                    self._claimed = not self._over
+                    try:
+                        if self._claimed:
+                            self._claim()
+                    except (FabfoldError, OSError) as error:
+                        trouble = str(error)
+                        process.terminate()
+            with suppress(BrokenPipeError):
+                process.stdin.close()  # That its input ends tells it that it may write.
+            said = process.stderr.read().decode(errors="replace").strip()
+            before = children_seconds()
+            process.wait()
+            self.processor_seconds = children_seconds() - before
+            last = "".join(said.splitlines()[-1:])
+            if process.returncode == 0:
+                text = f"{last}; better ones replace it"
+            elif self._over:
+                text = "given up" + (": the search is over" if self._searching else "")
+            else:
+                # The search has other trees.
+                text = f"not this time: {trouble or last.partition('Error: ')[2] or last}"
+            progress.update(1.0, text)
 
     def end(self) -> None:
-        """Give up what the final kit will replace."""
-        if self._process is not None and not self._over:
+        """Give up what the final kit will replace, or what nothing will come of."""
+        with self._lock:
             self._over = True
-            self._process.terminate()
-            if self._sender is not None:
-                self._sender.join()
-            if self._thread is None:
-                self._process.communicate()
+            if self._process is not None:
+                self._process.terminate()
         self.wait()
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Where no better kit will come, wait until this one is written."""
-        if kind is None or self._thread is None:
+        if kind is None or not (self._searching or self._claimed):
             self.end()
         self.wait()
 
     def wait(self) -> None:
         """Wait until nothing is written any more."""
-        if self._thread is not None:
-            self._thread.join()
+        for thread in self._threads:
+            thread.join()
 
-    def _follow(self, process: subprocess.Popen[bytes]) -> None:
-        with self._listener.stage("early") as progress:
-            if self._sender is not None:
-                self._sender.join()
-            # That its input ends tells it that it may write.
-            _, said = process.communicate()
-            last = "".join(said.decode(errors="replace").strip().splitlines()[-1:])
-            if process.returncode == 0:
-                text = f"{last}; better ones replace it"
-            elif self._over:
-                text = "given up: the search is over"
-            else:
-                # The search has other trees.
-                text = f"not this time: {last.partition('Error: ')[2] or last}"
-            progress.update(1.0, text)
+
+def _send(process: subprocess.Popen[bytes], work: bytes) -> None:
+    assert process.stdin is not None
+    with suppress(BrokenPipeError):  # It ended; what follows it says why.
+        process.stdin.write(work)
+        process.stdin.flush()
 
 
 def write_early(source: BinaryIO, before_writing: Callable[[], object] = lambda: None) -> str:
@@ -172,10 +193,9 @@ def write_early(source: BinaryIO, before_writing: Callable[[], object] = lambda:
     Parameters
     ----------
     source : binary file
-        A pickle of the recipe, template, print mode, folder, solid and wishes. Where it ends, files
-        may be written.
+        A pickle of the recipe, template, print mode, folder, solid and wishes.
     before_writing : callable, optional
-        Called once the bodies are made and files may be written.
+        Called once the bodies are made.
 
     Returns
     -------
@@ -195,7 +215,6 @@ def write_early(source: BinaryIO, before_writing: Callable[[], object] = lambda:
 
     recipe, template, mode, folder, solid, wishes = pickle.load(source)
     built = _first_built(recipe, template, solid, wishes, mode)
-    source.read()
     before_writing()
     write_printable(folder, recipe, mode, built)
     tree = built.planned.tree
@@ -233,12 +252,21 @@ def _keep_manifold_to_one_core() -> None:
         os.sched_setaffinity(0, cores)
 
 
+def _wait_to_write() -> None:
+    """Tell :class:`EarlyKit` that the bodies are made, and wait until they may be written."""
+    sys.stdout.write("made\n")
+    sys.stdout.flush()
+    sys.stdin.buffer.read()
+    # Given up before it writes anything, or not at all: there are no half-written kits.
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+
+
 if __name__ == "__main__":
     end_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # A run that is interrupted gives this up or waits for it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in _NEEDED:
         import_module(name)
     _keep_manifold_to_one_core()
-    # Given up before it writes anything, or not at all: there are no half-written kits.
-    said = write_early(sys.stdin.buffer, lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN))
+    said = write_early(sys.stdin.buffer, _wait_to_write)
     sys.stderr.write(f"{said}\n")

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -273,11 +272,12 @@ class Kit(StageRunner):
 
         mode = self.print_mode()
         files = self.recipe, self._template, mode, target
-        self._early = EarlyKit(*files, lambda: (self.solid(), self.wishes()), self.listener)
+        model = lambda: (self.solid(), self.wishes())  # noqa: E731
+        self._early = EarlyKit(*files, model, self._claim, self.listener)
         with self._early as early:
             with self._stand_by():
                 early.start(wanted=store is self._store and not self.recipe.pick)
-                self.cut_solid()  # Before anything in the folder changes.
+                self.cut_solid()  # Before anything in a folder with a kit changes.
             store.take()
             with recorded_export(store, target, self.recipe.name):
                 self.fold()
@@ -292,8 +292,11 @@ class Kit(StageRunner):
                             step.wait, self.wish_report(built.planned, built.joinery),
                             self._template, self.box_closure(built.planned),
                         )  # fmt: skip
+        self.processor_seconds["early"] = early.processor_seconds
         if store is not self._store:
-            self._keep_inputs(store)
+            from fabfold.kit.stage_files import keep_inputs
+
+            keep_inputs(store, self.recipe, self._files)
 
     def run(self, stage: str) -> None:
         """Run one stage by name, with all before it that is missing, and write its kit files.
@@ -337,26 +340,10 @@ class Kit(StageRunner):
         """Processor seconds that compiling the search's kernels took; part of the fit stage's."""
         return 0.0 if self._standby is None else self._standby.kernel_seconds
 
-    def _keep_inputs(self, store: StageStore) -> None:
-        """Copy the files that the recipe names."""
-        recipe = self.recipe
-        digests = (recipe.sha256, recipe.template_sha256, recipe.actions_sha256)
-        for (name, file), digest in zip(self._files.items(), digests, strict=True):
-            if file is not None:
-                store.keep(file, digest, name)
-
     def _rounds(self) -> Rounds:
-        begin = None if self._early is None else self._early.write
-        make = partial(self._rounds_of, self.recipe, seconds=self.seconds, on_begin=begin)
-        return self._once("rounds", make)
+        return self._once("rounds", lambda: self._rounds_of(self.recipe, seconds=self.seconds))
 
-    def _rounds_of(
-        self,
-        recipe: Recipe,
-        shift: int = 0,
-        seconds: float | None = None,
-        on_begin: Callable[[], None] | None = None,
-    ) -> Rounds:
+    def _rounds_of(self, recipe: Recipe, shift: int = 0, seconds: float | None = None) -> Rounds:
         """Search of the kit's voxelizations for its recipe, or one with another preference."""
         from fabfold.search.rounds import Rounds
 
@@ -373,7 +360,7 @@ class Kit(StageRunner):
                 seconds=seconds,
                 wishes=self.wishes(),
                 shift=shift,
-                on_begin=on_begin,
+                on_begin=None if self._early is None else self._early.search,
                 on_better=self.on_better,
                 standby=self._standby,
             )
@@ -442,12 +429,24 @@ class Kit(StageRunner):
 
     def _accept(self) -> None:
         """Write the recipe and keep the files that it names, before what was made is kept."""
-        if self.folder is not None and not self._accepted:
-            self._store.take()
-            self._keep_inputs(self._store)
-            write_text(self.folder / "kit.toml", self.recipe.to_toml())
-            self._accepted = True
-        super()._accept()
+        from fabfold.kit.stage_files import keep_inputs
+
+        with self._accepting:
+            if self.folder is not None and not self._accepted:
+                self._store.take()
+                keep_inputs(self._store, self.recipe, self._files)
+                write_text(self.folder / "kit.toml", self.recipe.to_toml())
+                self._accepted = True
+            super()._accept()
+
+    def _claim(self) -> None:
+        """Make the kit folder this run's, for a first kit is about to be written there."""
+        self._accept()
+        self._store.record_names([*self._store.names, self.recipe.name])
+
+    def _spent(self) -> float:
+        """Processor seconds so far, without those of the first kit."""
+        return super()._spent() - (self._early.processor_seconds if self._early else 0.0)
 
 
 def open_kit(

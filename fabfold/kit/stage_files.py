@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from fabfold.fold.motion import Motion
 from fabfold.joinery.bodies import BodyMesh, Joinery, PlacedPin
 from fabfold.kit.stages import BuiltTree, PlannedTree
 from fabfold.printing.checks import Check
+from fabfold.recipe.recipe import Recipe
 from fabfold.solid.closed_solid import Paint, Solid
 from fabfold.store import StageStore
 from fabfold.tree.fold_tree import FoldTree
@@ -20,6 +23,7 @@ from fabfold.voxels.thickening import Cut
 from fabfold.voxels.voxel_files import load_voxels, save_voxels
 
 __all__ = [
+    "keep_inputs",
     "load_built",
     "load_checks",
     "load_cut",
@@ -35,6 +39,24 @@ __all__ = [
 
 #: The model, the thicker one where it was thickened, and what is told of it.
 _SOLID, _THICK, _CUT = "solid.npz", "cut-solid.npz", "cut.json"
+
+
+def keep_inputs(store: StageStore, recipe: Recipe, files: Mapping[str, Path | None]) -> None:
+    """Copy the files that a recipe names.
+
+    Parameters
+    ----------
+    store : StageStore
+        Gets the copies.
+    recipe : Recipe
+        Has the digests of the files.
+    files : mapping of str to Path or None
+        Model, template and actions, in this order.
+    """
+    digests = (recipe.sha256, recipe.template_sha256, recipe.actions_sha256)
+    for (name, file), digest in zip(files.items(), digests, strict=True):
+        if file is not None:
+            store.keep(file, digest, name)
 
 
 def save_solid(store: StageStore, solid: Solid) -> list[str]:

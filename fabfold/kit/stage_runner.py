@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -57,6 +58,8 @@ class StageRunner:
         self._stranger = _made_by_another(store)
         self._results: dict[str, Any] = {}
         self._unsaved: list[Callable[[], None]] = []
+        # The first kit's thread accepts too.
+        self._accepting = threading.RLock()
 
     @property
     def damage(self) -> str:
@@ -65,20 +68,25 @@ class StageRunner:
 
     def _accept(self) -> None:
         """Change the kit folder for what was made; called once its input is known to be good."""
-        while self._unsaved:
-            self._unsaved.pop(0)()
+        with self._accepting:
+            while self._unsaved:
+                self._unsaved.pop(0)()
+
+    def _spent(self) -> float:
+        """Processor seconds so far that a stage may have cost."""
+        return processor_seconds()
 
     @contextmanager
     def _open_progress(self, name: str) -> Iterator[Progress]:
         """Progress of a stage that is about to be made."""
-        start = processor_seconds()
+        start = self._spent()
         try:
             with self.listener.stage(name) as progress:
                 yield progress
         finally:
             stage = name.partition("-")[0]  # the rounds of the search are numbered
             spent = self.processor_seconds.get(stage, 0.0)
-            self.processor_seconds[stage] = spent + processor_seconds() - start
+            self.processor_seconds[stage] = spent + self._spent() - start
 
     def _once(self, name: str, make: Callable[[], Result]) -> Result:
         """What `make` gives, made the first time and kept in memory."""

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from fabfold.child_process import end_with_parent, module_call
-from fabfold.progress import Progress
+from fabfold.progress import Progress, children_seconds
 
 __all__ = ["HALVES", "KernelCompiler", "compile_half", "forget_stale_kernels", "kernel_stamp"]
 
@@ -133,7 +133,7 @@ class KernelCompiler:
         """
         if not self._running:
             return
-        before = _children_seconds()
+        before = children_seconds()
         try:
             while any(process.poll() is None for process in self._running):
                 done = sum(process.poll() is not None for process in self._running)
@@ -147,7 +147,7 @@ class KernelCompiler:
                 self._write_stamp()
         finally:
             self.close()
-            self.processor_seconds += _children_seconds() - before
+            self.processor_seconds += children_seconds() - before
 
     def close(self) -> None:
         """End what still runs."""
@@ -166,12 +166,6 @@ class KernelCompiler:
             self._stamp.touch()
         except OSError:
             return  # Then the next run looks again; that costs it some seconds.
-
-
-def _children_seconds() -> float:
-    """Processor seconds of processes that have ended and were waited for."""
-    spent = os.times()
-    return spent.children_user + spent.children_system
 
 
 def compile_half(half: str) -> None:
