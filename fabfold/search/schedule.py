@@ -95,6 +95,9 @@ _SCHEDULES: dict[str, tuple[Rung, ...]] = {
     "normal": _rungs(EFFORTS["normal"], (4, 4), ((2, 1),), ((2, 0), (2, 6))),
     # On large templates a seed takes ten times as long, and few of them fold: what more of them
     # find does not pay, nor does a second start where the first did not fold.
+    "quick, large": _rungs(
+        replace(EFFORTS["quick"], restarts=1), (2, 2), ((2, 1),), ((1, 0), (1, 2))
+    ),
     "normal, large": _rungs(
         replace(EFFORTS["normal"], restarts=1), (2, 2), ((2, 1),), ((1, 0), (1, 4))
     ),
@@ -118,15 +121,14 @@ def schedule(effort: str, number: int, *, large: bool = False) -> tuple[Rung, ..
         Of the round, from 0. Rounds after the first follow where nothing folded: they try more
         roomy voxelizations before the others.
     large : bool
-        Whether the template is large; at normal effort fewer seeds search then.
+        Whether the template is large; unless the effort is thorough, less is tried then.
 
     Returns
     -------
     tuple of Rung
         In the order in which they run.
     """
-    large = large and effort == "normal"
-    first, *others = _SCHEDULES["normal, large" if large else effort]
+    first, *others = _SCHEDULES[f"{effort}, large" if large and effort != "thorough" else effort]
     if number == 0:
         return (first, *others)
     return (replace(first, seeds=4, options=4), *others)
