@@ -35,9 +35,6 @@ if TYPE_CHECKING:
 
 __all__ = ["plate_sweeps", "pocket_tools"]
 
-#: How far a hull may go beyond a plate that turns in its own plane between two placements, in mm.
-_EXCESS_MM = 0.3
-
 Floats = NDArray[np.float64]
 
 
@@ -209,7 +206,7 @@ def pocket_tools(
         if sweep.angle_deg == 0.0:
             steps = sweep.points[None]
         else:
-            step = hull_step_deg(sweep, voxel_mm, _EXCESS_MM)
+            step = hull_step_deg(sweep, voxel_mm)
             count = max(1, int(np.ceil(abs(sweep.angle_deg) / step)))
             places = sweep.placements(np.linspace(0.0, sweep.angle_deg, count + 1))
             steps = np.concatenate([places[:-1], places[1:]], axis=1)

@@ -216,7 +216,7 @@ def write_early(source: BinaryIO, before_writing: Callable[[], object] = lambda:
     recipe, template, mode, folder, solid, wishes = pickle.load(source)
     built = _first_built(recipe, template, solid, wishes, mode)
     before_writing()
-    write_printable(folder, recipe, mode, built)
+    write_printable(folder, recipe, mode, built, slicers=False)
     tree = built.planned.tree
     return f"{len(tree.hinges)} hinges, box closed to {100 * closed_share(tree):.0f} %"
 

@@ -222,6 +222,8 @@ def write_printable(
     mode: PrintMode,
     built: BuiltTree,
     guide: Mapping[str, bytes] | None = None,
+    *,
+    slicers: bool = True,
 ) -> None:
     """Write the tree, its certified motion, the bodies as STL, 3MF and URDF, and what to buy.
 
@@ -237,6 +239,8 @@ def write_printable(
         What is written.
     guide : mapping of str to bytes, optional
         Manual and pictures for Bambu Studio, by folder and name.
+    slicers : bool
+        Whether the files for single slicers are written beside the 3MF that all can read.
     """
     from fabfold.apart.plate_files import remove_plates, write_bill, write_plates
 
@@ -275,17 +279,18 @@ def write_printable(
             colours=colours,
             thumbnail=picture,
         )
-        write_slicer_files(
-            folder,
-            name,
-            printed,
-            recipe.slicer,
-            title=title,
-            metadata=metadata,
-            colours=colours,
-            thumbnail=picture,
-            auxiliaries=beside,
-        )
+        if slicers:
+            write_slicer_files(
+                folder,
+                name,
+                printed,
+                recipe.slicer,
+                title=title,
+                metadata=metadata,
+                colours=colours,
+                thumbnail=picture,
+                auxiliaries=beside,
+            )
     if built.retention is not None:
         write_json(folder / "retention.json", retention_data(built, built.retention))
     else:
