@@ -34,6 +34,8 @@ __all__ = ["EarlyKit", "write_early"]
 _NEEDED = ("fabfold.kit.writing", "manifold3d", "pymeshlab")
 #: Trees whose bodies are tried.
 _TREES = 3
+#: What the process says once it has something to write.
+_MADE = b"made\n"
 
 
 class EarlyKit:
@@ -135,7 +137,7 @@ class EarlyKit:
         with self._listener.stage("early") as progress:
             progress.update(None, "cut in haste, beside the good one")
             trouble = ""
-            if process.stdout.readline():
+            if any(line == _MADE for line in process.stdout):
                 with self._lock:
                     self._claimed = not self._over
                     try:
@@ -254,7 +256,7 @@ def _keep_manifold_to_one_core() -> None:
 
 def _wait_to_write() -> None:
     """Tell :class:`EarlyKit` that the bodies are made, and wait until they may be written."""
-    sys.stdout.write("made\n")
+    sys.stdout.buffer.write(_MADE)
     sys.stdout.flush()
     sys.stdin.buffer.read()
     # Given up before it writes anything, or not at all: there are no half-written kits.

@@ -272,8 +272,9 @@ class Kit(StageRunner):
 
         mode = self.print_mode()
         files = self.recipe, self._template, mode, target
-        model = lambda: (self.solid(), self.wishes())  # noqa: E731
-        self._early = EarlyKit(*files, model, self._claim, self.listener)
+        self._early = EarlyKit(
+            *files, lambda: (self.solid(), self.wishes()), self._claim, self.listener
+        )
         with self._early as early:
             with self._stand_by():
                 early.start(wanted=store is self._store and not self.recipe.pick)
