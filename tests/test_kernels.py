@@ -8,6 +8,8 @@ from numba.core import config
 
 from fabfold.fold.shortcut import shorten
 from fabfold.progress import SilentProgress
+from fabfold.proof.bvh import build_tree
+from fabfold.proof.gap import prove_pairs
 from fabfold.search import kernels
 from fabfold.search.kernels import (
     HALVES,
@@ -16,6 +18,7 @@ from fabfold.search.kernels import (
     forget_stale_kernels,
     kernel_stamp,
 )
+from fabfold.tree.large_neighbourhood import repair
 from fabfold.tree.leaf_assignment import reassign_leaves
 
 
@@ -83,5 +86,5 @@ def test_kernels_in_a_folder_of_the_users_own_are_left_alone(cache, monkeypatch)
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_calls_the_kernels_of_its_side(half):
     compile_half(half)
-    called = {"tree": reassign_leaves, "fold": shorten}[half]
-    assert called.signatures
+    called = {"tree": (reassign_leaves, repair, prove_pairs, build_tree), "fold": (shorten,)}[half]
+    assert all(kernel.signatures for kernel in called)

@@ -178,6 +178,8 @@ def compile_half(half: str) -> None:
     """
     if half == "tree":
         _search_without_folding()
+        # Not searched with, but wanted by the first kit soon after, and this half is the shorter.
+        _prove_a_gap()
     else:
         _fold_strips()
 
@@ -210,10 +212,24 @@ def _fold_strips() -> None:
         judge.path(system, found.guide)
 
 
+def _prove_a_gap() -> None:
+    """Prove that two triangles keep apart."""
+    from fabfold.proof.bvh import new_bodies, place
+    from fabfold.proof.gap import prove_pairs
+
+    corners = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
+    boxes, placed = new_bodies([corners, corners + 2.0])
+    place(boxes, placed, np.stack([np.eye(4)] * 2))
+    one, other = np.zeros(1, np.int32), np.ones(1, np.int32)
+    result, pair = np.array([2.0, np.inf, 0.0]), np.zeros(2, np.int32)
+    prove_pairs(boxes, placed, one, other, 0.0, 0.0, 1.0, 1e-6, result, pair)
+
+
 def _search_without_folding() -> None:
-    """Search the strip of the warm-up with a judge to whom everything folds."""
+    """Search the strip of the warm-up with a judge to whom everything folds, in both ways."""
     from dataclasses import replace
 
+    from fabfold.search.schedule import schedule
     from fabfold.search.warmup import warm_up_job
     from fabfold.tree.foldability import PlannerEstimate
     from fabfold.tree.solve import solve
@@ -233,7 +249,9 @@ def _search_without_folding() -> None:
             return np.stack([np.arange(len(system.parent)), system.turns], axis=1).astype(np.int32)
 
     job = warm_up_job()
-    solve(job.problem, 1, Yes(), replace(job.effort, kicks=1))
+    # Poses are annealed by most seeds, and grown by the first one.
+    for effort in (replace(job.effort, kicks=1), schedule("normal", 0)[0].effort):
+        solve(job.problem, 1, Yes(), effort)
 
 
 if __name__ == "__main__":
