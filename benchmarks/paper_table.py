@@ -62,20 +62,12 @@ class FirstKit:
     @contextmanager
     def stage(self, name: str) -> Iterator[Any]:
         """Look at the clock when the stage of the first kit ends with one."""
-        told = _Told()
+        from fabfold.progress import LastMessage
+
+        told = LastMessage()
         yield told
         if name == "early" and "box closed to" in told.message:
             self.seconds = time.perf_counter() - self._start
-
-
-class _Told:
-    """Keeps the last message of a stage."""
-
-    message = ""
-
-    def update(self, share: float | None, message: str = "") -> None:
-        """Hear of it."""
-        self.message = message
 
 
 def run_one(source: str, template: str, kit_folder: Path, effort: str) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager, contextmanager
 from typing import Protocol
 
 __all__ = [
+    "LastMessage",
     "Listener",
     "Progress",
     "SilentListener",
@@ -49,6 +50,23 @@ class SilentProgress:
 
     def update(self, share: float | None, message: str = "") -> None:
         """Do nothing."""
+
+
+class LastMessage:
+    """Keeps the last message of a stage.
+
+    Attributes
+    ----------
+    message : str
+        What was told last; empty before anything was.
+    """
+
+    message = ""
+
+    def update(self, share: float | None, message: str = "") -> None:
+        """Hear of it."""
+        if message:
+            self.message = message
 
 
 class ProgressPart:

@@ -16,7 +16,7 @@ from rich.progress import Progress as RichProgress
 from rich.table import Table
 
 from fabfold.errors import RecipeError, harmless
-from fabfold.progress import Progress, processor_seconds
+from fabfold.progress import LastMessage, Progress, processor_seconds
 
 if TYPE_CHECKING:
     from fabfold.kit.kit import Kit
@@ -81,14 +81,14 @@ class ConsoleListener:
         base, _, number = name.partition("-")
         title = _TITLES.get(base, base) + (f", round {int(number) + 1}" if number else "")
         if not self._console.is_terminal:
-            plain = _LastMessage()
+            plain = LastMessage()
             start = time.monotonic()
             try:
                 yield plain
             finally:  # What was reached is worth telling, also where the stage is stopped.
                 seconds = time.monotonic() - start
                 self._console.print(
-                    f"{title:32} {seconds:6.1f} s  {plain.message}",
+                    f"{title:32} {seconds:6.1f} s  {harmless(plain.message)}",
                     highlight=False,
                     markup=False,
                     soft_wrap=True,
@@ -143,14 +143,6 @@ class _LiveBar:
 
     def done(self) -> None:
         self._bar.update(self._task, total=1.0, completed=1.0)
-
-
-class _LastMessage:
-    message = ""
-
-    def update(self, share: float | None, message: str = "") -> None:
-        if message:
-            self.message = harmless(message)
 
 
 def show_result(kit: Kit, stage: str, checks: Sequence[Check] = ()) -> None:

@@ -2,8 +2,8 @@
 
 numba compiles a kernel when it is first called and keeps it beside the source. Without help the
 program itself and each worker would compile the same kernels side by side. So where they are not
-there yet, two processes compile a half each, those of the tree and those of folding, while the
-model is read and cut; the search begins when they are done.
+there yet, two processes compile a half each while the model is read and cut: those of the tree and
+of the proof, and those of folding. The search begins when they are done.
 """
 
 from __future__ import annotations
