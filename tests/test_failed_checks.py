@@ -113,7 +113,7 @@ def test_a_post_in_the_way_is_met_on_the_path_and_in_the_box(strip):
     made = BodyMesh(body.name, *printable_body(joined, body.name, np.zeros(3)))
     joinery = replace(strip.joinery, bodies=(made, *strip.joinery.bodies[1:]))
     checks = checks_of(replace(strip, joinery=joinery))
-    hits = checks["moves with a collision, a look every 1°"]
+    hits = checks["moves with a collision, a look every 2°"]
     assert not hits.ok
     assert (hits.figure, hits.limit) == (1.0, 0.0)  # the path has one move
     gap = checks["smallest gap seen on the folding path, every 30°"]

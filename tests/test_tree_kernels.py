@@ -157,7 +157,7 @@ def test_extra_cost_is_added_and_some_pairs_stay_rigid():
     face = int(np.flatnonzero((problem.source[j] - problem.source[i] == FACES).all(axis=1))[0])
     found = 0
     for pose in grow(problem, 1):
-        assert problem.tables.child_pose[face, 0, pose[i]] == pose[j]
+        assert problem.tables.child_pose[face, pose[i], 0] == pose[j]
         found += 1
         if found == 5:
             break
@@ -174,7 +174,7 @@ def test_joint_table_against_matrices():
         cell, rotation = int(rng.integers(len(cells))), int(rng.integers(24))
         joint = problem.joints[j][f]
         moved = problem.template.cells[cell] + ROTATIONS[rotation] @ np.array(joint.offset)
-        got = int(step[f, j, 24 * cell + rotation])
+        got = int(step[f, 24 * cell + rotation, j])
         if tuple(moved.tolist()) not in cells:
             assert got == -1
         else:

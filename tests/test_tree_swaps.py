@@ -34,7 +34,7 @@ def test_joints_keep_the_phase(joints, phases, turns):
     for pose in range(0, 24 * 8, 5):
         for face in (0, 1):
             for joint in range(len(problem.joints)):
-                child = tables.child_pose[face, joint, pose]
+                child = tables.child_pose[face, pose, joint]
                 u = 3
                 v = tables.neighbour[u, face]
                 if child < 0 or v < 0:

@@ -12,15 +12,16 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.errors import GeometryError
-from fabfold.export.body_brep import Brep, brep_of
+from fabfold.export.body_brep import Brep, Face, brep_of
 from fabfold.export.colours import body_colours, palette
 from fabfold.export.round_faces import round_regions, sculpted_triangles
-from fabfold.export.steptext import StepSolid, step_text
+from fabfold.export.steptext import FIRST_NUMBER, StepPart, StepSolid, step_file, step_part
 from fabfold.export.surfaces import (
     Axis,
     Plane,
@@ -176,26 +177,32 @@ def write_step(
     thin_mm = bound_mm if tree is not None else 0.0
     axes = barrel_axes(joinery, tree) if tree is not None else [[] for _ in joinery.bodies]
     application = f"fabfold {__version__}"
-    solids, plain, volume = [], [], 0.0
+    parts: list[StepPart] = []
+    faces: list[Face] = []
+    plain, volume, following = [], 0.0, FIRST_NUMBER
     for index, body in enumerate(joinery.bodies):
         progress.update(index / len(joinery.bodies), body.name)
         red, green, blue = (int(value) for value in colours[index])
-        brep, level, measured = _sound_brep(body, axes[index], thin_mm, application)
-        solids.append(StepSolid(body.name, brep, (red, green, blue)))
-        volume += measured
-        if not level.startswith("round"):
+        sound = _sound_part(body, (red, green, blue), axes[index], thin_mm, following, application)
+        parts.append(sound.part)
+        faces += sound.faces
+        volume += sound.volume_mm3
+        following = sound.part.following
+        if not sound.level.startswith("round"):
             plain.append(body.name)
     title = title or path.stem
-    write_text(path, step_text(solids, title, application))
+    write_text(path, step_file(parts, title, application))
+    solids = len(parts)
     if assembled is not None and hardware:
+        for solid in hardware:
+            parts.append(step_part(solid, parts[-1].following))
         assembled.parent.mkdir(exist_ok=True)
-        write_text(assembled, step_text([*solids, *hardware], f"{title} assembled", application))
+        write_text(assembled, step_file(parts, f"{title} assembled", application))
     elif assembled is not None:
         assembled.unlink(missing_ok=True)
-    progress.update(1.0, f"{len(solids)} solids")
-    faces = [face for solid in solids for face in solid.brep.faces]
+    progress.update(1.0, f"{solids} solids")
     return StepFacts(
-        solids=len(solids),
+        solids=solids,
         faces=len(faces),
         round_faces=sum(not isinstance(face.surface, Plane) for face in faces),
         plain=tuple(plain),
@@ -203,10 +210,24 @@ def write_step(
     )
 
 
-def _sound_brep(
-    body: BodyMesh, axes: list[Axis], thin_mm: float, application: str
-) -> tuple[Brep, str, float]:
-    """The best faces whose solid is valid and has the mesh's volume."""
+class _SoundPart(NamedTuple):
+    """A body whose solid the CAD kernel finds valid."""
+
+    part: StepPart
+    faces: tuple[Face, ...]
+    level: str
+    volume_mm3: float
+
+
+def _sound_part(
+    body: BodyMesh,
+    colour: tuple[int, int, int],
+    axes: list[Axis],
+    thin_mm: float,
+    first: int,
+    application: str,
+) -> _SoundPart:
+    """The best faces whose solid is valid and has the mesh's volume; entities from `first` on."""
     wanted = mesh_volume(body.vertices, body.faces)
     faults = []
     for level, shortest_mm, simplify in _LEVELS:
@@ -216,14 +237,13 @@ def _sound_brep(
                 points, triangles = to_mesh(to_manifold(*mesh).simplify(shortest_mm))
                 mesh = (points, triangles.astype(np.int32))
             brep = _brep(*without_needles(*mesh, shortest_mm), axes, level, thin_mm)
-            valid, volume = _measured(
-                step_text([StepSolid(body.name, brep, (0, 0, 0))], body.name, application)
-            )
+            part = step_part(StepSolid(body.name, brep, colour), first)
+            valid, volume = _measured(step_file([part], body.name, application))
         except (ValueError, IndexError, GeometryError) as error:
             faults.append(f"{level}: {error}")
             continue
         if valid and abs(volume - wanted) <= VOLUME_SHARE * wanted:
-            return brep, level, volume
+            return _SoundPart(part, brep.faces, level, volume)
         faults.append(f"{level}: {'valid' if valid else 'not valid'}, {volume:.2f} mm³")
     raise GeometryError(
         f"{body.name}: no valid STEP solid of its {len(body.faces)} triangles and {wanted:.2f} mm³ "

@@ -1,7 +1,8 @@
 """The text of a STEP file (ISO 10303-21, AP214): named, coloured solids in one assembly.
 
 Written without a CAD kernel: shared vertices and edges stay shared, the header holds no clock and
-no author, and the same solids give the same bytes.
+no author, and the same solids give the same bytes. The entities of a solid are numbered from where
+those of the solid before end, so the same lines do for a file of it alone and for one of all.
 
 References
 ----------
@@ -19,10 +20,12 @@ import numpy as np
 from fabfold.export.body_brep import Brep, BrepEdge, Face
 from fabfold.export.surfaces import Axis, Plane
 
-__all__ = ["StepSolid", "step_text"]
+__all__ = ["FIRST_NUMBER", "StepPart", "StepSolid", "step_file", "step_part", "step_text"]
 
 #: Points nearer than this count as one; readers take it as the model's precision, mm.
 UNCERTAINTY_MM = 1e-3
+#: Number of the first entity of a file's first solid; the smaller ones belong to the file itself.
+FIRST_NUMBER = 101
 
 
 class StepSolid(NamedTuple):
@@ -43,16 +46,43 @@ class StepSolid(NamedTuple):
     colour: tuple[int, int, int]
 
 
+class StepPart(NamedTuple):
+    """A solid as the lines of a file.
+
+    Attributes
+    ----------
+    name : str
+        Name of the solid.
+    colour : (int, int, int)
+        Its colour, sRGB bytes.
+    lines : tuple of str
+        Its entities.
+    number : int
+        The entity that is the solid.
+    following : int
+        The first number that is free after it.
+    """
+
+    name: str
+    colour: tuple[int, int, int]
+    lines: tuple[str, ...]
+    number: int
+    following: int
+
+
 class _Writer:
     """Numbers entities and joins equal ones."""
 
-    def __init__(self) -> None:
+    def __init__(self, first: int) -> None:
         self.lines: list[str] = []
+        self.following = first
         self._known: dict[str, int] = {}
 
     def add(self, text: str) -> int:
-        self.lines.append(f"#{len(self.lines) + 1}={text};")
-        return len(self.lines)
+        number = self.following
+        self.lines.append(f"#{number}={text};")
+        self.following = number + 1
+        return number
 
     def once(self, text: str) -> int:
         if text not in self._known:
@@ -120,7 +150,11 @@ def _axes_of(axis: Axis) -> tuple[list[float], list[float]]:
 
 
 def _edge(
-    writer: _Writer, points: list[list[float]], edge: BrepEdge, vertex: dict[int, int]
+    writer: _Writer,
+    points: list[list[float]],
+    edge: BrepEdge,
+    point: dict[int, int],
+    vertex: dict[int, int],
 ) -> int:
     if edge.axis is None:
         x, y, z = points[edge.start]
@@ -130,7 +164,7 @@ def _edge(
             raise ValueError("an edge of length zero")
         along = ((to_x - x) / length, (to_y - y) / length, (to_z - z) / length)
         vector = writer.add(f"VECTOR('',#{writer.direction(along)},1.)")
-        curve = writer.add(f"LINE('',#{writer.point((x, y, z))},#{vector})")
+        curve = writer.add(f"LINE('',#{point[edge.start]},#{vector})")
     else:
         upwards, sideways = _axes_of(edge.axis)
         centre = np.asarray(edge.axis.point) + edge.height * np.asarray(upwards)
@@ -162,15 +196,36 @@ def _surface(writer: _Writer, brep: Brep, face: Face) -> tuple[int, str]:
     return writer.add(f"CONICAL_SURFACE('',#{frame},{_real(radius)},{_real(angle)})"), sense
 
 
-def _solid(writer: _Writer, name: str, brep: Brep) -> int:
+def step_part(solid: StepSolid, first: int = FIRST_NUMBER) -> StepPart:
+    """The lines of a solid.
+
+    Parameters
+    ----------
+    solid : StepSolid
+        The solid.
+    first : int
+        Number of its first entity: `StepPart.following` of the solid before it in a file.
+
+    Returns
+    -------
+    StepPart
+        For :func:`step_file`.
+
+    Raises
+    ------
+    ValueError
+        If an edge has no length.
+    """
+    writer, brep = _Writer(first), solid.brep
+    point: dict[int, int] = {}
     vertex: dict[int, int] = {}
     points = brep.vertices.tolist()  # Plain numbers: an array of three costs more than it holds.
     for edge in brep.edges:
         for index in (edge.start, edge.end):
             if index not in vertex:
-                point = writer.point(points[index])
-                vertex[index] = writer.add(f"VERTEX_POINT('',#{point})")
-    edges = [_edge(writer, points, edge, vertex) for edge in brep.edges]
+                point[index] = writer.point(points[index])
+                vertex[index] = writer.add(f"VERTEX_POINT('',#{point[index]})")
+    edges = [_edge(writer, points, edge, point, vertex) for edge in brep.edges]
     faces = []
     for face in brep.faces:
         bounds = []
@@ -185,7 +240,8 @@ def _solid(writer: _Writer, name: str, brep: Brep) -> int:
         surface, sense = _surface(writer, brep, face)
         faces.append(writer.add(f"ADVANCED_FACE('',{_refs(bounds)},#{surface},{sense})"))
     shell = writer.add(f"CLOSED_SHELL('',{_refs(faces)})")
-    return writer.add(f"MANIFOLD_SOLID_BREP({_string(name)},#{shell})")
+    number = writer.add(f"MANIFOLD_SOLID_BREP({_string(solid.name)},#{shell})")
+    return StepPart(solid.name, solid.colour, tuple(writer.lines), number, writer.following)
 
 
 def _product(writer: _Writer, name: str, contexts: tuple[int, int]) -> tuple[int, int]:
@@ -212,12 +268,21 @@ def _styled(writer: _Writer, solid: int, colour: tuple[int, int, int]) -> int:
 
 
 def step_text(solids: Sequence[StepSolid], title: str, application: str) -> str:
+    """The whole file of some solids, as :func:`step_file` makes it of their parts."""
+    parts: list[StepPart] = []
+    for solid in solids:
+        parts.append(step_part(solid, parts[-1].following if parts else FIRST_NUMBER))
+    return step_file(parts, title, application)
+
+
+def step_file(parts: Sequence[StepPart], title: str, application: str) -> str:
     """The whole file.
 
     Parameters
     ----------
-    solids : sequence of StepSolid
-        The solids; each becomes a part of the assembly `title`, in its place.
+    parts : sequence of StepPart
+        The solids, no two with a number in common; each becomes a part of the assembly `title`, in
+        its place.
     title : str
         Name of the assembly.
     application : str
@@ -228,7 +293,7 @@ def step_text(solids: Sequence[StepSolid], title: str, application: str) -> str:
     str
         The content of the file, ASCII.
     """
-    writer = _Writer()
+    writer = _Writer(1)
     application_context = writer.add(
         "APPLICATION_CONTEXT('core data for automotive mechanical design processes')"
     )
@@ -261,13 +326,17 @@ def step_text(solids: Sequence[StepSolid], title: str, application: str) -> str:
         f"SHAPE_REPRESENTATION({_string(title)},(#{here}),#{context})"
     )
     writer.add(f"SHAPE_DEFINITION_REPRESENTATION(#{whole_shape},#{whole_representation})")
+    head, writer.lines = writer.lines, []
+    assert writer.following <= FIRST_NUMBER
+    writer.following = max((part.following for part in parts), default=FIRST_NUMBER)
     styled = []
-    for number, (name, brep, colour) in enumerate(solids, start=1):
-        solid = _solid(writer, name, brep)
-        styled.append(_styled(writer, solid, colour))
+    for number, part in enumerate(parts, start=1):
+        name = part.name
+        styled.append(_styled(writer, part.number, part.colour))
         definition, shape = _product(writer, name, contexts)
         representation = writer.add(
-            f"ADVANCED_BREP_SHAPE_REPRESENTATION({_string(name)},(#{here},#{solid}),#{context})"
+            f"ADVANCED_BREP_SHAPE_REPRESENTATION({_string(name)},(#{here},#{part.number}),"
+            f"#{context})"
         )
         writer.add(f"SHAPE_DEFINITION_REPRESENTATION(#{shape},#{representation})")
         usage = writer.add(
@@ -287,6 +356,7 @@ def step_text(solids: Sequence[StepSolid], title: str, application: str) -> str:
     writer.add(
         f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',{_refs(styled)},#{context})"
     )
+    data = [*head, *(line for part in parts for line in part.lines), *writer.lines]
     header = [
         "ISO-10303-21;",
         "HEADER;",
@@ -297,4 +367,4 @@ def step_text(solids: Sequence[StepSolid], title: str, application: str) -> str:
         "ENDSEC;",
         "DATA;",
     ]
-    return "\n".join([*header, *writer.lines, "ENDSEC;", "END-ISO-10303-21;", ""])
+    return "\n".join([*header, *data, "ENDSEC;", "END-ISO-10303-21;", ""])

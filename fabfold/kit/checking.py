@@ -24,7 +24,7 @@ __all__ = ["run_checks"]
 #: Largest error of a hinge's angle at a keyframe of the replay, degrees.
 ANGLE_LIMIT_DEG = 1.0
 #: Degrees between poses that are searched for collisions, and at which the gap is measured.
-STEP_DEG = 1.0
+STEP_DEG = 2.0
 GAP_STEP_DEG = 30.0
 #: Most of the kit's volume that may be carved away so that cells pass each other, per cent.
 CARVED_LIMIT = 5.0
@@ -96,7 +96,7 @@ def run_checks(built: BuiltTree, mode: PrintMode, progress: Progress) -> list[Ch
     checks += _play(built, mode)
     progress.update(0.1, "printability")
     checks += check_bodies(joinery, tree, motion, profile, progress, pose)
-    progress.update(0.5, "every degree of the path")
+    progress.update(0.5, "every second degree of the path")
     checks += _sampled(built, profile)
     progress.update(0.8, "replay in MuJoCo")
     meshes = [(body.vertices, body.faces) for body in joinery.bodies]

@@ -87,4 +87,6 @@ def join_key(recipe: Recipe, template: Template, mode: PrintMode, mark: list[Any
 def check_key(recipe: Recipe, template: Template, mode: PrintMode, mark: list[Any]) -> str:
     """Key of the checks; parameters as of :func:`join_key`."""
     pose = [] if mode.apart or mode.pose == "a" else [["pose", mode.pose]]
-    return stage_key(join_key(recipe, template, mode, mark), "check", "weighed", *pose)
+    return stage_key(
+        join_key(recipe, template, mode, mark), "check", "weighed, each second degree", *pose
+    )

@@ -1,4 +1,4 @@
-"""A second opinion on the folding path by other libraries: the printed bodies at every degree.
+"""A second opinion on the folding path by other libraries: the printed bodies at many angles.
 
 The proof of :mod:`fabfold.proof.certify` covers every angle, by code of this project. This check
 shares no code with it: forward kinematics of its own from the content of ``tree.json`` and

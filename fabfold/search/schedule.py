@@ -92,7 +92,7 @@ def _rungs(
 
 _SCHEDULES: dict[str, tuple[Rung, ...]] = {
     "quick": _rungs(EFFORTS["quick"], (2, 2), ((2, 1),), ((1, 0), (1, 2))),
-    "normal": _rungs(EFFORTS["normal"], (4, 4), ((2, 1),), ((2, 0), (2, 6))),
+    "normal": _rungs(EFFORTS["normal"], (4, 4), ((2, 1),), ((2, 0), (1, 8))),
     # On large templates a seed takes ten times as long, and few of them fold: what more of them
     # find does not pay, nor does a second start where the first did not fold.
     "quick, large": _rungs(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,7 @@ class SpanningTree:
     system: HingeSystem
     joints: NDArray[np.int32]
 
-    @property
+    @cached_property
     def hinged_pairs(self) -> set[tuple[int, int]]:
         """Voxel pairs that carry a hinge, smaller voxel first."""
         return {(min(a, b), max(a, b)) for a, b in self.joints[:, :2].tolist()}
@@ -306,7 +307,7 @@ def _rigid_edges(
                 v = int(tables.neighbour[u, face])
                 if v < 0 or seen[v] or not tables.allowed[u, face, 0] or body[v] != body[u]:
                     continue
-                if tables.child_pose[face, 0, pose[u]] == pose[v]:
+                if tables.child_pose[face, pose[u], 0] == pose[v]:
                     seen[v] = True
                     queue.append(v)
                     edges.append(Edge(u, v, "R"))

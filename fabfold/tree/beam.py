@@ -37,7 +37,7 @@ def _keeps_rigid(tables: Tables, pose: NDArray[np.int32], v: int, q: int) -> boo
     for f in range(6):
         if tables.always_rigid[v, f]:
             parent = pose[tables.neighbour[v, f]]
-            if parent >= 0 and tables.child_pose[f ^ 1, 0, parent] != q:
+            if parent >= 0 and tables.child_pose[f ^ 1, parent, 0] != q:
                 return False
     return True
 
@@ -56,6 +56,10 @@ def _most_constrained(
     allow_partial: bool,
 ) -> int:
     """The unplaced voxel with the fewest free places beside its placed neighbours.
+
+    Places to which a double hinge leads count only for a voxel that has no others: they are so many
+    that counting all of them takes longer than placing the voxels, and whoever is short of the
+    others is to be placed first.
 
     A state is dead when a voxel has no place left, or when the free cells that the frontier can
     reach are fewer than the voxels left that need a whole cell.
@@ -92,6 +96,8 @@ def _most_constrained(
     best_key = 1e18
     octant_mask = tables.octant_mask
     has_rigid_pairs = len(tables.always_rigid) > 0
+    joints = tables.child_pose.shape[2]
+    doubles = joints > tables.last_single + 1
     left = 0
     seeds = 0
     stamp[1] += 1
@@ -106,39 +112,45 @@ def _most_constrained(
         placed = 0
         waiting = 0
         bound = False
-        for f in range(6):
-            u = tables.neighbour[v, f]
-            if u < 0:
-                continue
-            parent = pose[u]
-            if parent < 0:
-                waiting += 1
-                continue
-            placed += 1
-            bound = bound or (has_rigid_pairs and tables.always_rigid[v, f])
-            g = f ^ 1
-            for j in range(tables.child_pose.shape[1]):
-                if not tables.allowed[u, g, j]:
+        for by_double in range(2 if doubles else 1):
+            if by_double and (found > 0 or placed == 0):
+                break
+            first = tables.last_single + 1 if by_double else 0
+            last = joints if by_double else tables.last_single + 1
+            placed = waiting = 0
+            for f in range(6):
+                u = tables.neighbour[v, f]
+                if u < 0:
                     continue
-                q = tables.child_pose[g, j, parent]
-                if (
-                    q < 0
-                    or seen_pose[q] == stamp[0]
-                    or conflicts(taken[q // 24], octant_mask, v, q)
-                ):
+                parent = pose[u]
+                if parent < 0:
+                    waiting += 1
                     continue
-                seen_pose[q] = stamp[0]
-                if has_rigid_pairs and not _keeps_rigid(tables, pose, v, q):
-                    continue
-                found += 1
+                placed += 1
+                bound = bound or (has_rigid_pairs and tables.always_rigid[v, f])
+                g = f ^ 1
+                for j in range(first, last):
+                    if not tables.allowed[u, g, j]:
+                        continue
+                    q = tables.child_pose[g, parent, j]
+                    if (
+                        q < 0
+                        or seen_pose[q] == stamp[0]
+                        or conflicts(taken[q // 24], octant_mask, v, q)
+                    ):
+                        continue
+                    seen_pose[q] = stamp[0]
+                    if has_rigid_pairs and not _keeps_rigid(tables, pose, v, q):
+                        continue
+                    found += 1
+                    if not flood and found >= best_key:
+                        break
+                    if flood and reached[q // 24] != stamp[1]:
+                        reached[q // 24] = stamp[1]
+                        reached[len(taken) + seeds] = q // 24
+                        seeds += 1
                 if not flood and found >= best_key:
-                    break
-                if flood and reached[q // 24] != stamp[1]:
-                    reached[q // 24] = stamp[1]
-                    reached[len(taken) + seeds] = q // 24
-                    seeds += 1
-            if not flood and found >= best_key:
-                break  # another voxel has fewer places
+                    break  # another voxel has fewer places
         if placed == 0:
             continue
         if found == 0:
@@ -200,7 +212,7 @@ def _joined_clusters(
         if u < 0 or pose[u] < 0:
             continue
         g = f ^ 1
-        if tables.allowed[u, g, 0] and tables.child_pose[g, 0, pose[u]] == q:
+        if tables.allowed[u, g, 0] and tables.child_pose[g, pose[u], 0] == q:
             known = False
             for i in range(count):
                 if joined[i] == label[u]:
@@ -267,7 +279,7 @@ def fill_beam(
     """
     count = len(start)
     cell_count = len(tables.cells)
-    joints = tables.child_pose.shape[1]
+    joints = tables.child_pose.shape[2]
     doubles = joints > tables.last_single + 1
     has_rigid_pairs = len(tables.always_rigid) > 0
     # Two generations of states: `now` is expanded into `after`.
@@ -286,8 +298,9 @@ def fill_beam(
     priority = np.zeros(count)
     for v in unplaced:
         priority[v] = 0.9 * random_float(generator)
-    # Options of one generation: a state, and the pose that its next voxel takes.
-    most = 6 * joints * beam_width
+    # Options of one generation, best first: a state, and the pose that its next voxel takes. Only
+    # so many are kept: to sort all that double hinges offer would take longer than to find them.
+    most = 6 * beam_width
     from_state = np.empty(most, np.int32)
     to_pose = np.empty(most, np.int32)
     noisy_score = np.empty(most)
@@ -301,7 +314,8 @@ def fill_beam(
             shared[0, 0] += occupy(taken[0, 0], octant_mask, v, start[v])
     if shared[0, 0] >= tables.max_shared:
         close_taken_cells(taken[0, 0])
-    flood = len(unplaced) > 8 and not allow_partial
+    # A double hinge leads past its neighbours to cells that no free ones lead to.
+    flood = len(unplaced) > 8 and not allow_partial and not doubles
     next_voxel[0, 0] = _most_constrained(
         tables,
         pose[0, 0],
@@ -339,7 +353,7 @@ def fill_beam(
                 for j in range(first, joints if f >= 6 else tables.last_single + 1):
                     if not tables.allowed[u, g, j]:
                         continue
-                    q = tables.child_pose[g, j, here[u]]
+                    q = tables.child_pose[g, here[u], j]
                     if q < 0 or seen_pose[q] == stamp[0]:
                         continue
                     if conflicts(taken[now, b, q // 24], octant_mask, v, q):
@@ -357,20 +371,31 @@ def fill_beam(
                         delta += _DOUBLE_HINGE_PRICE
                     if taken[now, b, q // 24] != 0:
                         delta -= counted_twice_in_cell(tables, here, v, q)
-                    from_state[options] = b
-                    to_pose[options] = q
-                    new_score[options] = score[now, b] + delta
-                    noisy_score[options] = new_score[options] + noise * random_float(generator)
-                    new_key[options] = key[now, b] ^ mix(
+                    fresh = score[now, b] + delta
+                    noisy = fresh + noise * random_float(generator)
+                    if options == most and noisy >= noisy_score[most - 1]:
+                        continue
+                    place = min(options, most - 1)
+                    options = min(options + 1, most)
+                    while place > 0 and noisy_score[place - 1] > noisy:
+                        from_state[place] = from_state[place - 1]
+                        to_pose[place] = to_pose[place - 1]
+                        noisy_score[place] = noisy_score[place - 1]
+                        new_score[place] = new_score[place - 1]
+                        new_key[place] = new_key[place - 1]
+                        place -= 1
+                    from_state[place] = b
+                    to_pose[place] = q
+                    new_score[place] = fresh
+                    noisy_score[place] = noisy
+                    new_key[place] = key[now, b] ^ mix(
                         np.uint64(v) * np.uint64(24 * cell_count) + np.uint64(q)
                     )
-                    options += 1
-        order = np.argsort(noisy_score[:options])
         after = 1 - now
         kept = 0
         last = level == len(unplaced) - 1
         tried = 0
-        for place in order:
+        for place in range(options):
             if kept == beam_width or tried == 4 * beam_width:
                 break
             # States with the same poses have the same Zobrist hash.

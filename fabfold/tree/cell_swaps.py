@@ -63,7 +63,7 @@ def _joint_kind(
 ) -> int:
     """What could join voxel u to what lies behind its face: `_NONE`, `_RIGID` and so on."""
     for j in range(allowed.shape[2]):
-        if child_pose[f, j, here] == there and allowed[u, f, j]:
+        if child_pose[f, here, j] == there and allowed[u, f, j]:
             if j == 0:
                 return _RIGID
             return _DOUBLE if j > last_single else _SINGLE
@@ -71,42 +71,40 @@ def _joint_kind(
 
 
 @njit(cache=True)
-def _degrees(
+def _look_anew(
     v: int,
     but: int,
-    pairs: NDArray[np.int32],
-    pair_at: NDArray[np.int32],
-    kind: NDArray[np.int8],
-) -> tuple[int, int]:
-    """Rigid joints and joints of any kind that a voxel could have, but for those with `but`."""
-    rigid = joined = 0
-    for f in range(6):
-        e = pair_at[v, f]
-        if e >= 0 and kind[e] != _NONE and pairs[e, 0] != but and pairs[e, 1] != but:
-            joined += 1
-            rigid += kind[e] == _RIGID
-    return rigid, joined
-
-
-@njit(cache=True)
-def _recount(
-    v: int,
     pairs: NDArray[np.int32],
     pair_at: NDArray[np.int32],
     allowed: NDArray[np.bool_],
     child_pose: NDArray[np.int32],
     pose: NDArray[np.int32],
     last_single: int,
+    kept: NDArray[np.int8],
     kind: NDArray[np.int8],
-) -> None:
-    """Bring `kind` of the pairs of a voxel up to date."""
+) -> tuple[int, int, int, int]:
+    """Bring `kind` of the pairs of a voxel up to date, but for that with `but`.
+
+    Returns
+    -------
+    rigid, joined, new_rigid, new_joined : int
+        Of these pairs those that could be rigid, and those that any joint could join: by `kept`,
+        and as they are now.
+    """
+    rigid = joined = new_rigid = new_joined = 0
     for f in range(6):
         e = pair_at[v, f]
-        if e >= 0:
-            a, b = pairs[e, 0], pairs[e, 1]
-            kind[e] = _joint_kind(
-                allowed, child_pose, last_single, a, pairs[e, 2], pose[a], pose[b]
-            )
+        if e < 0:
+            continue
+        a, b = pairs[e, 0], pairs[e, 1]
+        if a + b - v != but:
+            new = _joint_kind(allowed, child_pose, last_single, a, pairs[e, 2], pose[a], pose[b])
+            kind[e] = new
+            rigid += kept[e] == _RIGID
+            joined += kept[e] != _NONE
+            new_rigid += new == _RIGID
+            new_joined += new != _NONE
+    return rigid, joined, new_rigid, new_joined
 
 
 @njit(cache=True)
@@ -195,9 +193,9 @@ def _propose(
         u = neighbour[v, f]
         if u < 0:
             return -1, -1, -1
-        j = random_below(generator, child_pose.shape[1])
+        j = random_below(generator, child_pose.shape[2])
         if allowed[u, f ^ 1, j]:
-            q = child_pose[f ^ 1, j, pose[u]]
+            q = child_pose[f ^ 1, pose[u], j]
     else:
         c = random_below(generator, len(occupant))
         r = turns[v, c, random_below(generator, most) if most > 1 else 0]
@@ -222,7 +220,7 @@ def _torn_pairs(tables: Tables, pose: NDArray[np.int32]) -> int:
         for f in range(0, 6, 2):
             if tables.always_rigid[v, f]:
                 u = tables.neighbour[v, f]
-                torn += tables.child_pose[f, 0, pose[v]] != pose[u]
+                torn += tables.child_pose[f, pose[v], 0] != pose[u]
     return torn
 
 
@@ -391,21 +389,17 @@ def anneal_swaps(  # noqa: PLR0912, PLR0915 - one loop, kept whole for speed
             now[w] = p
         # Taken out, a voxel leaves no fewer clusters and pieces, but for one where it was all
         # alone; put back, it is one more, less its joints. So there are at least so many:
-        rigid, joined = _degrees(v, -1, pairs, pair_at, kind)
-        least_clusters, least_pieces = clusters + (rigid > 0), pieces + (joined > 0)
+        rigid, joined, new_rigid, new_joined = _look_anew(
+            v, -1, pairs, pair_at, allowed, child_pose, now, last_single, kept, kind
+        )
+        least_clusters = clusters + (rigid > 0) - new_rigid
+        least_pieces = pieces + (joined > 0) - new_joined
         if w >= 0:
-            rigid, joined = _degrees(w, v, pairs, pair_at, kind)
-            least_clusters += rigid > 0
-            least_pieces += joined > 0
-            _recount(w, pairs, pair_at, allowed, child_pose, now, last_single, kind)
-        _recount(v, pairs, pair_at, allowed, child_pose, now, last_single, kind)
-        rigid, joined = _degrees(v, -1, pairs, pair_at, kind)
-        least_clusters -= rigid
-        least_pieces -= joined
-        if w >= 0:
-            rigid, joined = _degrees(w, v, pairs, pair_at, kind)
-            least_clusters -= rigid
-            least_pieces -= joined
+            rigid, joined, new_rigid, new_joined = _look_anew(
+                w, v, pairs, pair_at, allowed, child_pose, now, last_single, kept, kind
+            )
+            least_clusters += (rigid > 0) - new_rigid
+            least_pieces += (joined > 0) - new_joined
         taken = False
         fresh_clusters = fresh_pieces = fresh_outside = fresh_left = 0
         fresh_joints = 0.0

@@ -71,8 +71,8 @@ class Effort:
     restarts: int = 3
     starts: int = 2
     choices: int = 2
-    swaps: int = 30000
-    settling: int = 40
+    swaps: int = 18000
+    settling: int = 30
     removals: int = 6000
     closure_tests: int = 8
     planner_runs: int = 1
@@ -87,7 +87,7 @@ class Effort:
     spanning_trees: int = 3
     short_patience: int = 40
     long_patience: int = 100
-    polish_patience: int = 80
+    polish_patience: int = 24
     near_miss: float = 0.12
     max_candidates: int = 5
 

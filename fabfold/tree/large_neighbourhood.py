@@ -65,7 +65,7 @@ def _ruin_around_cluster(
             v = tables.neighbour[u, f]
             if v < 0 or label[v] == cluster or out[v] or not tables.allowed[u, f, 0]:
                 continue
-            q = tables.child_pose[f, 0, pose[u]]
+            q = tables.child_pose[f, pose[u], 0]
             if q < 0:
                 continue
             held = occupants[q // 24]

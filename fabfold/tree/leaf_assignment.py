@@ -100,7 +100,7 @@ def _list_leaves(
     Voxels that no cut may part from a neighbour are no leaves.
     """
     count = len(pose)
-    joints = tables.child_pose.shape[1]
+    joints = tables.child_pose.shape[2]
     seen = np.zeros(count, np.bool_)
     inner = np.zeros(count, np.bool_)
     queue = np.empty(count, np.int32)
@@ -122,7 +122,7 @@ def _list_leaves(
             if v < 0 or seen[v]:
                 continue
             for j in range(joints):
-                if tables.allowed[u, f, j] and tables.child_pose[f, j, pose[u]] == pose[v]:
+                if tables.allowed[u, f, j] and tables.child_pose[f, pose[u], j] == pose[v]:
                     seen[v] = inner[u] = True
                     queue[end] = v
                     end += 1
@@ -149,14 +149,14 @@ def _clusters_joined(
         u = tables.neighbour[v, f]
         if u < 0 or pose[u] < 0:
             continue
-        if not (tables.allowed[u, f ^ 1, 0] and tables.child_pose[f ^ 1, 0, pose[u]] == q):
+        if not (tables.allowed[u, f ^ 1, 0] and tables.child_pose[f ^ 1, pose[u], 0] == q):
             continue
         fresh = True
         for g in range(f):
             w = tables.neighbour[v, g]
             if w < 0 or pose[w] < 0 or label[w] != label[u]:
                 continue
-            if tables.allowed[w, g ^ 1, 0] and tables.child_pose[g ^ 1, 0, pose[w]] == q:
+            if tables.allowed[w, g ^ 1, 0] and tables.child_pose[g ^ 1, pose[w], 0] == q:
                 fresh = False
         count += fresh
     return count
@@ -176,7 +176,7 @@ def _price_places(
     best_pose: NDArray[np.int32],
 ) -> None:
     """Fill `cost` and `best_pose` for each of `voxels` in each cell that has a `column`."""
-    joints = tables.child_pose.shape[1]
+    joints = tables.child_pose.shape[2]
     cost[: len(voxels)] = _NEVER
     for i in range(len(voxels)):
         v = voxels[i]
@@ -187,7 +187,7 @@ def _price_places(
             for j in range(joints):
                 if not tables.allowed[u, f ^ 1, j]:
                     continue
-                q = tables.child_pose[f ^ 1, j, pose[u]]
+                q = tables.child_pose[f ^ 1, pose[u], j]
                 if q < 0 or column[q // 24] < 0:
                     continue
                 value = np.float64(tables.cost[v, q]) - empty_cost[q // 24]

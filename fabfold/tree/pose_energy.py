@@ -65,7 +65,7 @@ def label_pieces(
                 if v < 0 or pose[v] < 0 or label[v] >= 0:
                     continue
                 for j in range(last + 1):
-                    if tables.allowed[u, f, j] and tables.child_pose[f, j, pose[u]] == pose[v]:
+                    if tables.allowed[u, f, j] and tables.child_pose[f, pose[u], j] == pose[v]:
                         label[v] = found
                         stack[top] = v
                         top += 1
@@ -111,7 +111,7 @@ def doubles_needed(tables: Tables, pose: NDArray[np.int32]) -> int:
     int
         The pieces, less one, that rigid joints and single hinges leave.
     """
-    if tables.last_single + 1 >= tables.child_pose.shape[1]:
+    if tables.last_single + 1 >= tables.child_pose.shape[2]:
         return 0
     return max(0, label_pieces(tables, pose, tables.last_single, np.empty(len(pose), np.int32)) - 1)
 
@@ -133,7 +133,7 @@ def count_defects(tables: Tables, pose: NDArray[np.int32]) -> int:
         Voxels without a pose, plus the pieces, less one, that the possible joints leave. Zero for
         a full set of poses that some tree joins.
     """
-    joints = tables.child_pose.shape[1]
+    joints = tables.child_pose.shape[2]
     defects = label_pieces(tables, pose, joints - 1, np.empty(len(pose), np.int32))
     for v in range(len(pose)):
         if pose[v] < 0:

@@ -38,14 +38,15 @@ _LEAF_STEPS, _MOST_LEAVES, _LEAF_TRIES = 0.35, 12, 20
 #: Energy of a piece that no hinge joins, while poses are made joinable and after.
 _PIECE_WHILE_JOINING, PIECE = 2.0, 10.0
 #: Annealing by swaps: first and last temperature, and energy of a piece.
-_HOT, _COLD, _PIECE_WHILE_SWAPPING = 0.25, 0.03, 0.22
+_HOT, _COLD, _PIECE_WHILE_SWAPPING = 0.12, 0.05, 0.22
 #: Share of an annealing after which only hinges that can turn count.
 _THEN_TURNING = 0.7
 #: What is left in pieces is annealed again, at most so often, for a shorter time: share of the
 #: steps, first temperature, energy of a piece.
-_MENDS, _MEND_SHARE, _MEND_HOT, _MEND_PIECE = 3, 0.25, 0.15, 0.6
-#: Phases are drawn by their bound: the best one so often, else the next one so often, and so on.
-_BEST_PHASE = 0.5
+_MENDS, _MEND_SHARE, _MEND_HOT, _MEND_PIECE = 3, 0.35, 0.15, 0.6
+#: Phases are drawn by their bound: one that is higher by so much energy, e times more seldom. What
+#: annealing makes of them differs by a little more than their bounds do, and in one phase by this.
+_PHASE_SCALE = 0.2
 #: Annealings in a row that end in pieces after which poses are grown instead.
 _PATIENCE = 4
 
@@ -174,11 +175,12 @@ class PoseMoves:
         problem, tables = self.problem, self.tables
         bounds = phase_bounds(problem, with_wishes=True)
         # Rounded, so that what is equal but for the order of a sum is equal.
-        energies = sorted({round(bound.energy, 5) for bound in bounds})
+        energies = np.unique([round(bound.energy, 5) for bound in bounds])
+        odds = np.exp((energies[:1] - energies) / _PHASE_SCALE)
         steps = self.effort.swaps * len(problem)
         in_pieces = 0
         while bounds and in_pieces < _PATIENCE and not self.stopped():
-            energy = energies[min(int(self.rng.geometric(_BEST_PHASE)), len(energies)) - 1]
+            energy = self.rng.choice(energies, p=odds / odds.sum())
             alike = [bound for bound in bounds if round(bound.energy, 5) == energy]
             phase = alike[int(self.rng.integers(len(alike)))]
             pose = np.empty(len(problem), np.int32)

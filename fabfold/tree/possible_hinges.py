@@ -71,7 +71,7 @@ def max_hinge_rows(tables: Tables) -> int:
     """
     most = 1
     for f in range(6):
-        for j in range(tables.child_pose.shape[1]):
+        for j in range(tables.child_pose.shape[2]):
             most = max(most, tables.realization_start[f, j + 1] - tables.realization_start[f, j])
     return 3 * len(tables.source) * most
 
@@ -79,8 +79,8 @@ def max_hinge_rows(tables: Tables) -> int:
 @njit(cache=True)
 def _joint_between(tables: Tables, u: int, f: int, v: int, pose: NDArray[np.int32]) -> int:
     """Joint type that carries `v`, across face `f` of `u`, to its pose; -1 for none."""
-    for j in range(tables.child_pose.shape[1]):
-        if tables.allowed[u, f, j] and tables.child_pose[f, j, pose[u]] == pose[v]:
+    for j in range(tables.child_pose.shape[2]):
+        if tables.allowed[u, f, j] and tables.child_pose[f, pose[u], j] == pose[v]:
             return j
     return -1
 

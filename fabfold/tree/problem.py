@@ -131,7 +131,7 @@ class TreeProblem:
             return tables
         return tables._replace(
             allowed=np.ascontiguousarray(tables.allowed[:, :, :last]),
-            child_pose=np.ascontiguousarray(tables.child_pose[:, :last]),
+            child_pose=np.ascontiguousarray(tables.child_pose[:, :, :last]),
             joint_weight=tables.joint_weight[:last].copy(),
             realization_start=np.ascontiguousarray(tables.realization_start[:, : last + 1]),
         )

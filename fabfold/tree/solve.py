@@ -44,7 +44,7 @@ __all__ = ["Statistics", "solve"]
 _FOCUSED = 0.5
 #: First and last temperature while poses settle: those that were grown, those that were annealed,
 #: and after a kick.
-_GROWN, _ANNEALED, _KICKED = (0.5, 0.12), (0.15, 0.05), (0.12, 0.05)
+_GROWN, _ANNEALED, _KICKED = (0.5, 0.12), (0.1, 0.04), (0.12, 0.05)
 #: Energy by which a tree must be better to count as better.
 _GAIN = 1e-6
 #: First and last temperature of phase B: of each tree that folds, and of the best.
@@ -131,18 +131,18 @@ class _Search:
         for tree in choice.trees(kept, self.effort.spanning_trees, self.generator):
             self.statistics.trees += 1
             stuck = self.judge.stuck_hinges(tree.system)
-            penalty = self.objective.stuck_hinge * float(stuck.sum())
-            trouble = stuck.any(axis=0)
+            penalty = self.objective.stuck_hinge * float(np.count_nonzero(stuck))
             steps = guide
             self.statistics.closed += penalty == 0
             if penalty == 0 and plan:
                 found = self.planner_estimate(tree, guide, bound == 0.0)
-                trouble = found.unresolved > 0
                 left = float(found.unresolved.sum())
-                penalty = self.objective.stuck_hinge * left / max(1, 2 * len(trouble))
-                steps = found.guide
+                penalty = self.objective.stuck_hinge * left / max(1, 2 * len(found.unresolved))
+                steps, stuck = found.guide, found.unresolved[None] > 0
             if best is None or penalty < best.penalty:
-                focus = np.unique(tree.joints[trouble, :2]).astype(np.int32)
+                focus = ANYWHERE
+                if penalty > 0:
+                    focus = np.unique(tree.joints[stuck.any(axis=0), :2]).astype(np.int32)
                 best = SearchState(pose, energy, tree, penalty, focus, steps)
             if penalty == 0:
                 break
@@ -278,6 +278,11 @@ class _Search:
             return None
         return Candidate(fold_tree(self.problem, state.pose, state.tree), path, self.seed)
 
+    def energy(self, state: SearchState) -> float:
+        """Energy of the poses of a state, by the weights of the recipe."""
+        energy, _ = energy_of(self.problem.tables, state.pose, self.problem.empty_face)
+        return float(energy)
+
     def settled_and_folded(
         self,
         start: SearchState,
@@ -285,16 +290,19 @@ class _Search:
         heats: tuple[float, float],
         least: float = math.inf,
     ) -> SearchState | None:
-        """A tree that folds, settled from a start and polished for a moment; None for none."""
+        """A tree that folds, settled from a start and polished for a moment; None for none.
+
+        What has settled without becoming better than `least` is given up: folding and polishing
+        it takes as long again, and seldom makes up for it.
+        """
         self.moves.tables = self.phase_a_tables
         settled, folded = self.settle(start, steps, heats, least) if steps else (start, None)
-        if folded is None and settled is not None:
+        if folded is None and settled is not None and self.energy(settled) < least - _GAIN:
             folded = self.fold(settled)
         self.moves.tables = self.problem.tables
         if folded is None:
             return None
-        energy, _ = energy_of(self.moves.tables, folded.pose, self.problem.empty_face)
-        folded = replace(folded, energy=energy)
+        folded = replace(folded, energy=self.energy(folded))
         self.keep(folded)
         return self.polish(folded, self.effort.polish_each, *_POLISH_EACH)
 

@@ -26,7 +26,7 @@ class Tables(NamedTuple):
         Voxel across each face, -1 where there is none or no joint is possible.
     allowed : (n, 6, J) bool array
         Whether a joint type can be made there.
-    child_pose : (6, J, 24 m) int32 array
+    child_pose : (6, 24 m, J) int32 array
         Pose of the child from the face, the joint and the parent's pose; -1 outside the template.
     joint_weight : (J,) float64 array
         Energy of each joint type.
@@ -107,7 +107,7 @@ def joint_table(
 
     Returns
     -------
-    child_pose : (6, J, 24 m) int32 array
+    child_pose : (6, 24 m, J) int32 array
         Pose of the child from the face, the joint and the parent's pose; -1 outside the template.
     cell_neighbour : (m, 6) int32 array
         Template cell across each face, -1 outside.
@@ -118,7 +118,7 @@ def joint_table(
     pad = 2
     grid = np.full(np.array(template.shape) + 2 * pad, -1, dtype=np.int32)
     grid[tuple((cells + pad).T)] = np.arange(len(cells), dtype=np.int32)
-    child_pose = np.full((6, len(joints), 24 * len(cells)), -1, dtype=np.int32)
+    child_pose = np.full((6, 24 * len(cells), len(joints)), -1, dtype=np.int32)
     parents = 24 * np.arange(len(cells), dtype=np.int32)
     for index, by_face in enumerate(joints):
         for face, joint in enumerate(by_face):
@@ -126,7 +126,7 @@ def joint_table(
                 moved = cells + ROTATIONS[rotation] @ np.array(joint.offset, dtype=np.int32) + pad
                 landing = grid[tuple(moved.T)]
                 turned = ROTATION_PRODUCT[rotation, joint.rotation]
-                child_pose[face, index, parents + rotation] = np.where(
+                child_pose[face, parents + rotation, index] = np.where(
                     landing >= 0, 24 * landing + turned, -1
                 )
     cell_neighbour = np.stack([grid[tuple((cells + d + pad).T)] for d in FACES], axis=1)

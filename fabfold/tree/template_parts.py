@@ -293,9 +293,9 @@ def _restricted(
     home = np.repeat(parts.part, 24)
     child_pose[(child_pose >= 0) & (home[child_pose] != home)] = -1
     for cut in cuts:
-        there = tables.child_pose[cut.face, 0, cut.poses]
-        child_pose[cut.face, 0, cut.poses] = there
-        child_pose[cut.face ^ 1, 0, there] = cut.poses
+        there = tables.child_pose[cut.face, cut.poses, 0]
+        child_pose[cut.face, cut.poses, 0] = there
+        child_pose[cut.face ^ 1, there, 0] = cut.poses
     cost, expected_cost, shown = _shown_when_folded(problem, parts, depth)
     own = parts.part[None, :] == group[:, None]
     cost += np.where(np.repeat(own, 24, axis=1), 0.0, MISPLACED).astype(np.float32)
