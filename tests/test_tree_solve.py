@@ -13,7 +13,8 @@ from fabfold.fold.lattice_planner import count_free_moves
 from fabfold.tree.effort import Effort
 from fabfold.tree.initial_poses import grow
 from fabfold.tree.kinematics_check import check_tree
-from fabfold.tree.solve import solve
+from fabfold.tree.search_state import Statistics
+from fabfold.tree.solve import _Search, solve
 from fabfold.tree.system import hinge_system
 
 
@@ -173,3 +174,15 @@ def test_what_folds_while_poses_settle_is_found(dog):
     system = hinge_system(found.tree)
     assert check_tree(found.tree) == []
     assert count_free_moves(system, found.path) == len(found.path)
+
+
+@pytest.mark.slow
+def test_what_settles_no_better_is_neither_folded_nor_polished(dog, animal_trees):
+    statistics = Statistics()
+    search = _Search(dog, 0, LatticeFoldability(), QUICK, statistics)
+    state = search.state_of(animal_trees[0])
+    runs = statistics.planner_runs
+    assert search.settled_and_folded(state, 0, (0.1, 0.05), state.energy) is None
+    assert statistics.planner_runs == runs and not search.results
+    search.settled_and_folded(state, 0, (0.1, 0.05), state.energy + 0.1)
+    assert statistics.planner_runs > runs

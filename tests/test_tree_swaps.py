@@ -2,16 +2,19 @@
 
 import numpy as np
 import pytest
-from tree_cases import animal
+from tree_cases import animal, solid_problem, strip
 
 from fabfold.search.warmup import warm_up_job
 from fabfold.tree.assembly import hinge_choice
 from fabfold.tree.bound import phase_bounds
 from fabfold.tree.catalogue import joint_types
 from fabfold.tree.cell_swaps import anneal_swaps
+from fabfold.tree.effort import Effort
 from fabfold.tree.phases import phase_labels, phase_of, phase_rotations
 from fabfold.tree.pose_energy import energy_of
+from fabfold.tree.pose_moves import PoseMoves
 from fabfold.tree.rng import generator
+from fabfold.tree.search_state import Statistics
 from fabfold.tree.spanning_trees import loose_pieces
 from fabfold.tree.swept_cells import hinge_tables
 
@@ -104,3 +107,27 @@ def test_one_swap_moves_two_voxels_at_most(beast):
         assert set(changed) & set(focus.tolist())
         moved += 1
     assert moved
+
+
+def test_starts_are_in_the_phases_that_could_close_the_box_best():
+    depth = np.random.default_rng(4).uniform(0.0, 1.0, (8, 6))
+    problem = solid_problem(strip(8), "box-2x2x2", depth=depth)
+    bounds = phase_bounds(problem)
+    worse = np.array([bound.energy for bound in bounds]) - bounds[0].energy
+    assert worse.max() > 0.6
+    effort = Effort(swaps=500, choices=1)
+    moves = PoseMoves(
+        problem, effort, np.random.default_rng(0), generator(0), Statistics(), lambda: False
+    )
+    starts = [state for (state, _), _ in zip(moves.starts(0), range(30), strict=False)]
+    rows = np.arange(8)
+    of_start = [
+        next(b.energy for b in bounds if (b.turns[rows, s.pose // 24, 0] == s.pose % 24).all())
+        for s in starts
+    ]
+    assert len(starts) == 30
+    above = np.array(of_start) - bounds[0].energy
+    odds = np.exp(-np.unique(worse.round(5)) / 0.2)
+    expected = (odds * np.unique(worse.round(5))).sum() / odds.sum()
+    assert expected < 0.6 * worse.mean()
+    assert above.mean() == pytest.approx(expected, abs=0.05)
