@@ -90,17 +90,25 @@ def _rungs(
     )
 
 
+def _large(effort: str) -> Effort:
+    """Effort of a seed on a large template: one start, made with more care."""
+    return replace(
+        EFFORTS[effort],
+        restarts=1,
+        swaps=30000,
+        swap_heats=(0.25, 0.03),
+        settling=40,
+        settle_heats=(0.15, 0.05),
+    )
+
+
 _SCHEDULES: dict[str, tuple[Rung, ...]] = {
     "quick": _rungs(EFFORTS["quick"], (2, 2), ((2, 1),), ((1, 0), (1, 2))),
     "normal": _rungs(EFFORTS["normal"], (4, 4), ((2, 1),), ((2, 0), (1, 8))),
     # On large templates a seed takes ten times as long, and few of them fold: what more of them
     # find does not pay, nor does a second start where the first did not fold.
-    "quick, large": _rungs(
-        replace(EFFORTS["quick"], restarts=1), (2, 2), ((2, 1),), ((1, 0), (1, 2))
-    ),
-    "normal, large": _rungs(
-        replace(EFFORTS["normal"], restarts=1), (2, 2), ((2, 1),), ((1, 0), (1, 4))
-    ),
+    "quick, large": _rungs(_large("quick"), (2, 2), ((2, 1),), ((1, 0), (1, 2))),
+    "normal, large": _rungs(_large("normal"), (2, 2), ((2, 1),), ((1, 0), (1, 4))),
     "thorough": _rungs(
         EFFORTS["thorough"],
         (12, 6),

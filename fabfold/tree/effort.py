@@ -29,9 +29,13 @@ class Effort:
         Sets of poses made for each start; the one of least energy is taken.
     swaps : int
         Swaps, per voxel, of the annealing that makes a set of poses; 0 to grow them instead.
+    swap_heats : (float, float)
+        First and last temperature of that annealing, weighted energy.
     settling : int
         Steps, per start and voxel, in which energy and hinges that cannot move go down together
         before the planner is asked for the first time.
+    settle_heats : (float, float)
+        First and last temperature of settling, for poses that were annealed.
     removals : int
         Large-neighbourhood steps, per start, until hinges that can turn join all the clusters.
     closure_tests : int
@@ -72,7 +76,9 @@ class Effort:
     starts: int = 2
     choices: int = 2
     swaps: int = 18000
+    swap_heats: tuple[float, float] = (0.12, 0.05)
     settling: int = 30
+    settle_heats: tuple[float, float] = (0.1, 0.04)
     removals: int = 6000
     closure_tests: int = 8
     planner_runs: int = 1

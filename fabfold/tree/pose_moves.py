@@ -37,8 +37,8 @@ _SWAP_STEPS, _SWAP_TRIES = 0.5, 1000
 _LEAF_STEPS, _MOST_LEAVES, _LEAF_TRIES = 0.35, 12, 20
 #: Energy of a piece that no hinge joins, while poses are made joinable and after.
 _PIECE_WHILE_JOINING, PIECE = 2.0, 10.0
-#: Annealing by swaps: first and last temperature, and energy of a piece.
-_HOT, _COLD, _PIECE_WHILE_SWAPPING = 0.12, 0.05, 0.22
+#: Energy of a piece while poses are annealed by swaps.
+_PIECE_WHILE_SWAPPING = 0.22
 #: Share of an annealing after which only hinges that can turn count.
 _THEN_TURNING = 0.7
 #: What is left in pieces is annealed again, at most so often, for a shorter time: share of the
@@ -178,6 +178,7 @@ class PoseMoves:
         energies = np.unique([round(bound.energy, 5) for bound in bounds])
         odds = np.exp((energies[:1] - energies) / _PHASE_SCALE)
         steps = self.effort.swaps * len(problem)
+        hot, cold = self.effort.swap_heats
         in_pieces = 0
         while bounds and in_pieces < _PATIENCE and not self.stopped():
             energy = self.rng.choice(energies, p=odds / odds.sum())
@@ -186,7 +187,7 @@ class PoseMoves:
             pose = np.empty(len(problem), np.int32)
             _, energy, left = anneal_swaps(
                 tables, phase.pose, phase.turns, problem.empty_face, hinge_tables(),
-                _PIECE_WHILE_SWAPPING, math.inf, ANYWHERE, steps, _HOT, _COLD, _THEN_TURNING,
+                _PIECE_WHILE_SWAPPING, math.inf, ANYWHERE, steps, hot, cold, _THEN_TURNING,
                 self.generator, pose,
             )  # fmt: skip
             for _ in range(_MENDS):
@@ -194,7 +195,7 @@ class PoseMoves:
                     break
                 _, energy, left = anneal_swaps(
                     tables, pose.copy(), phase.turns, problem.empty_face, hinge_tables(),
-                    _MEND_PIECE, math.inf, ANYWHERE, int(_MEND_SHARE * steps), _MEND_HOT, _COLD,
+                    _MEND_PIECE, math.inf, ANYWHERE, int(_MEND_SHARE * steps), _MEND_HOT, cold,
                     0.0, self.generator, pose,
                 )  # fmt: skip
             in_pieces = in_pieces + 1 if left else 0

@@ -42,9 +42,8 @@ __all__ = ["Statistics", "solve"]
 
 #: Share of steps of phase A that start from the hinges in trouble.
 _FOCUSED = 0.5
-#: First and last temperature while poses settle: those that were grown, those that were annealed,
-#: and after a kick.
-_GROWN, _ANNEALED, _KICKED = (0.5, 0.12), (0.1, 0.04), (0.12, 0.05)
+#: First and last temperature while poses settle: those that were grown, and after a kick.
+_GROWN, _KICKED = (0.5, 0.12), (0.12, 0.05)
 #: Energy by which a tree must be better to count as better.
 _GAIN = 1e-6
 #: First and last temperature of phase B: of each tree that folds, and of the best.
@@ -329,7 +328,7 @@ class _Search:
         self.moves.tables = self.phase_a_tables
         for start, annealed in self.moves.starts(self.seed):
             statistics.starts += 1
-            heats = _ANNEALED if annealed else _GROWN
+            heats = effort.settle_heats if annealed else _GROWN
             folded = self.settled_and_folded(start, effort.settling, heats)
             self.moves.tables = self.phase_a_tables
             if folded is not None:
