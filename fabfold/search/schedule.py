@@ -74,7 +74,9 @@ def _rungs(
         starts=1,
         choices=1,
         swaps=0,
+        swap_heats=Effort.swap_heats,
         settling=0,
+        settle_heats=Effort.settle_heats,
         polish_each=100,
         polish_best=0,
     )

@@ -291,7 +291,7 @@ def _restricted(
     # No joint leads from part to part, but for the rigid one at the places of the cuts.
     child_pose = tables.child_pose.copy()
     home = np.repeat(parts.part, 24)
-    child_pose[(child_pose >= 0) & (home[child_pose] != home)] = -1
+    child_pose[(child_pose >= 0) & (home[child_pose] != home[:, None])] = -1
     for cut in cuts:
         there = tables.child_pose[cut.face, cut.poses, 0]
         child_pose[cut.face, cut.poses, 0] = there
