@@ -23,12 +23,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from runs import HERE, MODELS, SHARED
+from runs import HERE, MODELS, SEARCH, SHARED
 
 PLOT = HERE.parent / "docs" / "pictures" / "energy-over-time.svg"
-#: Raised with every change of the search that changes its trees or what they cost: rows of earlier
-#: ones are marked.
-SEARCH = 2
 #: Seconds at which the plot and the table look at the best tree so far.
 MARKS = (5, 10, 20, 40, 80, 160)
 

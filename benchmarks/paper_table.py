@@ -27,6 +27,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from runs import SEARCH
+
 HERE = Path(__file__).resolve().parent
 SHARED = HERE.parents[1] / "shared"
 #: name: (source, template, joints of the paper, core-hours of the paper)
@@ -76,7 +78,7 @@ def run_one(source: str, template: str, kit_folder: Path, effort: str) -> dict[s
     from fabfold.kit.kit import Kit
 
     first = FirstKit()
-    row: dict[str, Any] = {"template": template, "effort": effort}
+    row: dict[str, Any] = {"template": template, "effort": effort, "search": SEARCH}
     start = time.perf_counter()
     kit = None
     try:
@@ -185,6 +187,11 @@ def _key(name: str, effort: str) -> str:
     return name if effort == USUAL else f"{name}, {effort}"
 
 
+def _told(name: str, row: dict[str, Any]) -> str:
+    """The name of a row in the table, marked where an earlier search made it."""
+    return name if row.get("search") == SEARCH else f"{name} *"
+
+
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """Markdown of all rows."""
     lines = [
@@ -194,7 +201,8 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         "with the defaults of `fabfold export` (seed 1) where no effort is named. Joints are",
         "single hinges + double ones, in brackets those of the paper, all single. *verify*",
         "is an independent checker of the kit folder, where it is at hand. *Closed* is the share",
-        "of the box's faces that is closed, and what the same voxels allow at most.",
+        "of the box's faces that is closed, and what the same voxels allow at most. Rows with",
+        "a * are of an earlier search, which took longer; so is the comparison with 0.1.",
         "",
         "| model | template | voxels | joints (paper) | surface | count | total | closed | moves |"
         " carved cells | struts | gap mm | exit | verify |",
@@ -212,7 +220,8 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         s = row["summary"]
         e, made = s["energy"], s["joints"]
         lines.append(
-            f"| {name} | {row['template']} | {s['voxels']} | {made['S']} + {made['D']}{joints} |"
+            f"| {_told(name, row)} | {row['template']} | {s['voxels']} |"
+            f" {made['S']} + {made['D']}{joints} |"
             f" {e['surface']:.2f} | {e['count']:.2f} | {e['total']:.2f} |"
             f" {s['box_closed']:.2f} of {s['box_closed_at_most']:.2f} | {s['moves']} |"
             f" {s['carved_cells']} | {s['struts']} | {row['gap']:.3f} | {row['exit']} |"
@@ -232,7 +241,9 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         hours = MODELS.get(name.partition(",")[0], ("", "", None, None))[3]
         cells = [f"{row['seconds'].get(stage, 0.0):.1f}" for stage in STAGES]
         lines.append(
-            f"| {name} | " + " | ".join(cells) + f" | {sum(row['seconds'].values()):.1f} |"
+            f"| {_told(name, row)} | "
+            + " | ".join(cells)
+            + f" | {sum(row['seconds'].values()):.1f} |"
             f" {'–' if row['first'] is None else format(row['first'], '.1f')} |"
             f" {row['total']:.1f} | {row['peak_mib']:.0f} |"
             f" {hours or '–'} |"
