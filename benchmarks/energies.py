@@ -23,7 +23,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from runs import HERE, MODELS, SEARCH, SHARED
+from runs import HERE, MODELS, SEARCH, SHARED, marked
 
 PLOT = HERE.parent / "docs" / "pictures" / "energy-over-time.svg"
 #: Seconds at which the plot and the table look at the best tree so far.
@@ -112,8 +112,13 @@ def table(rows: dict[str, dict[str, Any]], before: dict[str, dict[str, Any]]) ->
             if "error" in row:
                 lines.append(f"| {name} | {row['effort']} | {row['seed']} | {row['error']} |")
                 continue
-            told = name if row.get("search") == SEARCH else f"{name} *"
-            cells = [told, row["effort"], row["seed"], row["voxels"], f"{row['energy']:.2f}"]
+            cells = [
+                marked(name, row),
+                row["effort"],
+                row["seed"],
+                row["voxels"],
+                f"{row['energy']:.2f}",
+            ]
             cells += [f"{old['energy']:.2f}" if "energy" in old else "–"]
             cells += [row["hinges"], old.get("hinges", "–"), f"{row['closed']:.3f}"]
             cells += [f"{old['closed']:.3f}" if "closed" in old else "–", f"{row['at_most']:.3f}"]

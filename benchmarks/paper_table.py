@@ -27,7 +27,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from runs import SEARCH
+from runs import SEARCH, marked
 
 HERE = Path(__file__).resolve().parent
 SHARED = HERE.parents[1] / "shared"
@@ -187,11 +187,6 @@ def _key(name: str, effort: str) -> str:
     return name if effort == USUAL else f"{name}, {effort}"
 
 
-def _told(name: str, row: dict[str, Any]) -> str:
-    """The name of a row in the table, marked where an earlier search made it."""
-    return name if row.get("search") == SEARCH else f"{name} *"
-
-
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """Markdown of all rows."""
     lines = [
@@ -220,7 +215,7 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         s = row["summary"]
         e, made = s["energy"], s["joints"]
         lines.append(
-            f"| {_told(name, row)} | {row['template']} | {s['voxels']} |"
+            f"| {marked(name, row)} | {row['template']} | {s['voxels']} |"
             f" {made['S']} + {made['D']}{joints} |"
             f" {e['surface']:.2f} | {e['count']:.2f} | {e['total']:.2f} |"
             f" {s['box_closed']:.2f} of {s['box_closed_at_most']:.2f} | {s['moves']} |"
@@ -241,7 +236,7 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         hours = MODELS.get(name.partition(",")[0], ("", "", None, None))[3]
         cells = [f"{row['seconds'].get(stage, 0.0):.1f}" for stage in STAGES]
         lines.append(
-            f"| {_told(name, row)} | "
+            f"| {marked(name, row)} | "
             + " | ".join(cells)
             + f" | {sum(row['seconds'].values()):.1f} |"
             f" {'–' if row['first'] is None else format(row['first'], '.1f')} |"

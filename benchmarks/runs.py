@@ -263,3 +263,8 @@ class Recorder:
                 "seed": candidate.seed,
             }
         )
+
+
+def marked(name: str, row: dict[str, Any]) -> str:
+    """The name of a table's row, marked where an earlier search made it."""
+    return name if row.get("search") == SEARCH else f"{name} *"
