@@ -88,7 +88,7 @@ def answer(read: Callable[[Path], Any], path: Path) -> str:
     try:
         return f"takes it, {len(read(path))} faces"
     except ModelError as error:
-        return f"refuses it: {str(error).split(';')[0].removeprefix(path.name)[:60]}"
+        return f"refuses it: {str(error).split(';')[0].removeprefix(path.name).strip()[:60]}"
     except Exception as error:
         return f"{type(error).__name__}: {str(error).splitlines()[0][:60]}"
 
