@@ -6,8 +6,9 @@
 Each model runs in a fresh process with an empty kit folder, on the command line's defaults.
 Processor seconds are those that each stage has cost, with the processes that it started; STEP is
 written beside the checks, and is counted where it ends. Memory is the largest process.
-Without names every model is run; with names only those rows are measured again. With `--before`
-version 0.1, taken from the repository's history, makes each kit too, right after this version.
+Without names every model is run; with names only those rows are measured again, and of two runs
+that make the same kit the faster one is shown. With `--before` version 0.1, taken from the
+repository's history, makes each kit too, right after this version.
 """
 
 from __future__ import annotations
@@ -150,6 +151,18 @@ class Before:
         return row
 
 
+def _kept(known: dict[str, Any] | None, row: dict[str, Any]) -> dict[str, Any]:
+    """Of two runs that made the same kit the faster one; else the new one."""
+    if known is None:
+        return row
+    kept = row
+    same = ("search", "exit", "verify", "summary")
+    if all(known.get(key) == row.get(key) for key in same) and known["cpu"] < row["cpu"]:
+        kept = known
+    before = row.get("before", known.get("before"))
+    return kept if before is None else {**kept, "before": before}
+
+
 def before_table(rows: dict[str, dict[str, Any]]) -> list[str]:
     """Lines of Markdown of those rows that version 0.1 made too."""
     both = {name: row for name, row in rows.items() if "before" in row}
@@ -192,8 +205,9 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
     lines = [
         "# The paper's models and the samples, end to end",
         "",
-        "Written by `python benchmarks/paper_table.py [--effort quick]` on 2 cores, one run each,",
-        "with the defaults of `fabfold export` (seed 1) where no effort is named. Joints are",
+        "Written by `python benchmarks/paper_table.py [--effort quick]` on 2 cores, one run each",
+        "(of two that make the same kit the faster), with the defaults of `fabfold export` (seed",
+        "1) where no effort is named. Joints are",
         "single hinges + double ones, in brackets those of the paper, all single. *verify*",
         "is an independent checker of the kit folder, where it is at hand. *Closed* is the share",
         "of the box's faces that is closed, and what the same voxels allow at most. Rows with",
@@ -305,12 +319,10 @@ def main() -> None:
         if old_version is not None:
             beside = {key: row[key] for key in ("cpu", "total", "summary") if key in row}
             row["before"] = {**old_version.row(source, template), "beside": beside}
-        elif "before" in rows.get(_key(name, options.effort), {}):
-            row["before"] = rows[_key(name, options.effort)]["before"]
-        rows[_key(name, options.effort)] = row
         print(
             f"{name}: exit {row['exit']}, {row['total']:.1f} s", row.get("verify", ""), flush=True
         )
+        rows[_key(name, options.effort)] = _kept(rows.get(_key(name, options.effort)), row)
         keys = [_key(one, effort) for effort in ("quick", USUAL, "thorough") for one in jobs]
         ordered = {key: rows[key] for key in keys if key in rows}
         memory.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
