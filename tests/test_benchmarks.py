@@ -76,3 +76,19 @@ def test_energies_measures_one_search():
     row = json.loads(run("energies.py", "--effort", "quick", "--one", "sample:car", "box-3x4x4"))
     assert row["energy"] == row["curve"][-1][1]
     assert row["closed"] <= row["at_most"] and row["search_s"] > 0
+
+
+def test_of_two_runs_that_make_the_same_kit_the_faster_is_shown(monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    kept = importlib.import_module("paper_table")._kept
+    fast = {"search": 2, "exit": 0, "verify": "passes", "summary": {"bodies": 20}, "cpu": 70.0}
+    slow = {**fast, "cpu": 90.0}
+    assert kept(None, slow) is slow
+    assert kept(fast, slow) == fast
+    assert kept(slow, fast) == fast
+    # Another kit, or one that fails, is shown however long it takes.
+    for other in ({"summary": {"bodies": 21}}, {"exit": 1}, {"verify": "died"}, {"search": 3}):
+        assert kept(fast, {**slow, **other}) == {**slow, **other}
+    # The comparison with 0.1 is a run of its own, and the last one counts.
+    assert kept({**fast, "before": {"cpu": 1.0}}, slow) == {**fast, "before": {"cpu": 1.0}}
+    assert kept(fast, {**slow, "before": {"cpu": 2.0}}) == {**fast, "before": {"cpu": 2.0}}
