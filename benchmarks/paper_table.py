@@ -7,13 +7,14 @@ Each model runs in a fresh process with an empty kit folder, on the command line
 Processor seconds are those that each stage has cost, with the processes that it started; STEP is
 written beside the checks, and is counted where it ends. Memory is the largest process.
 Without names every model is run; with names only those rows are measured again, and of two runs
-that make the same kit the faster one is shown. With `--before` version 0.1, taken from the
-repository's history, makes each kit too, right after this version.
+in which the same code makes the same kit the faster one is shown. With `--before` version 0.1,
+taken from the repository's history, makes each kit too, right after this version.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import resource
@@ -80,6 +81,7 @@ def run_one(source: str, template: str, kit_folder: Path, effort: str) -> dict[s
 
     first = FirstKit()
     row: dict[str, Any] = {"template": template, "effort": effort, "search": SEARCH}
+    row["code"] = code_digest()
     start = time.perf_counter()
     kit = None
     try:
@@ -151,12 +153,21 @@ class Before:
         return row
 
 
+def code_digest() -> str:
+    """SHA-256 of the program's sources: what got slower by a change is not hidden by older runs."""
+    digest = hashlib.sha256()
+    for package in ("fabfold", "hinges"):
+        for path in sorted((HERE.parent / package).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
 def _kept(known: dict[str, Any] | None, row: dict[str, Any]) -> dict[str, Any]:
-    """Of two runs that made the same kit the faster one; else the new one."""
+    """Of two runs in which the same code made the same kit the faster one; else the new one."""
     if known is None:
         return row
     kept = row
-    same = ("search", "exit", "verify", "summary")
+    same = ("code", "search", "exit", "verify", "summary")
     if all(known.get(key) == row.get(key) for key in same) and known["cpu"] < row["cpu"]:
         kept = known
     before = row.get("before", known.get("before"))
@@ -206,8 +217,8 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         "# The paper's models and the samples, end to end",
         "",
         "Written by `python benchmarks/paper_table.py [--effort quick]` on 2 cores, one run each",
-        "(of two that make the same kit the faster), with the defaults of `fabfold export` (seed",
-        "1) where no effort is named. Joints are",
+        "(of two in which the same code makes the same kit the faster), with the defaults of",
+        "`fabfold export` (seed 1) where no effort is named. Joints are",
         "single hinges + double ones, in brackets those of the paper, all single. *verify*",
         "is an independent checker of the kit folder, where it is at hand. *Closed* is the share",
         "of the box's faces that is closed, and what the same voxels allow at most. Rows with",

@@ -81,13 +81,15 @@ def test_energies_measures_one_search():
 def test_of_two_runs_that_make_the_same_kit_the_faster_is_shown(monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     kept = importlib.import_module("paper_table")._kept
-    fast = {"search": 2, "exit": 0, "verify": "passes", "summary": {"bodies": 20}, "cpu": 70.0}
+    fast = {"code": "a", "search": 2, "exit": 0, "verify": "passes", "cpu": 70.0}
+    fast["summary"] = {"bodies": 20}
     slow = {**fast, "cpu": 90.0}
     assert kept(None, slow) is slow
     assert kept(fast, slow) == fast
     assert kept(slow, fast) == fast
-    # Another kit, or one that fails, is shown however long it takes.
-    for other in ({"summary": {"bodies": 21}}, {"exit": 1}, {"verify": "died"}, {"search": 3}):
+    # Other code, another kit, or one that fails, is shown however long it takes.
+    others = [{"summary": {"bodies": 21}}, {"exit": 1}, {"verify": "died"}, {"search": 3}]
+    for other in (*others, {"code": "b"}):
         assert kept(fast, {**slow, **other}) == {**slow, **other}
     # The comparison with 0.1 is a run of its own, and the last one counts.
     assert kept({**fast, "before": {"cpu": 1.0}}, slow) == {**fast, "before": {"cpu": 1.0}}
