@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from fabfold.errors import GeometryError
 from fabfold.export.body_brep import Brep, Face, brep_of
 from fabfold.export.colours import body_colours, palette
+from fabfold.export.rims import straightened
 from fabfold.export.round_faces import round_regions, sculpted_triangles
 from fabfold.export.steptext import FIRST_NUMBER, StepPart, StepSolid, step_file, step_part
 from fabfold.export.surfaces import (
@@ -275,7 +276,8 @@ def _brep(
     labels, planes = flat_regions(vertices, faces)
     if thin_mm > 0 and level.endswith("thinned"):
         sculpted = sculpted_triangles(vertices, faces, labels, planes, axes)
-        vertices, faces = thinned(vertices, faces, sculpted, thin_mm)
+        simpler = straightened(vertices, faces, labels, planes, sculpted, thin_mm)
+        vertices, faces = thinned(*simpler, thin_mm, original=(vertices, faces))
         labels, planes = flat_regions(vertices, faces)
     surfaces = list(planes)
     if level.startswith("round"):
