@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from fabfold.tree.kinematics_check import check_tree
 from fabfold.tree.pose_energy import doubles_needed
 from fabfold.tree.problem import tree_problem
 from fabfold.tree.rng import generator
+from fabfold.tree.search_state import axes_of_tree
 from fabfold.tree.solve import solve
 from fabfold.tree.swept_cells import double_blocked, hinge_tables
 from fabfold.tree.system import HingeSystem, hinge_system
@@ -114,7 +116,7 @@ def test_trees_reserve_edges_voxels_and_faces():
     for pose in grow(problem, 3, root_poses=100):
         choice = hinge_choice(problem, pose)
         for _ in range(10):
-            found = choice.tree(choice.preference(set(), 0.0), state)
+            found = choice.tree(choice.kept(None), state)
             if found is None:
                 continue
             made = fold_tree(problem, pose, found)
@@ -129,6 +131,29 @@ def test_trees_reserve_edges_voxels_and_faces():
                 made.energy["count"] + weights.surface * made.energy["surface"], abs=1e-4
             )
     assert with_links
+
+
+@pytest.mark.slow
+def test_a_tree_keeps_the_edges_and_turns_of_its_hinges():
+    """Two voxels may be joined about one edge or another; a tree that folds folds by its own."""
+    rng = np.random.default_rng(0)
+    problem = doubled(strip(8), "box-2x2x2", hinge=rng.random((7, 4)) < 0.3)
+    state = generator(5)
+    several = 0
+    for pose in chain.from_iterable(grow(problem, seed, root_poses=100) for seed in range(3, 7)):
+        choice = hinge_choice(problem, pose)
+        ways = Counter(frozenset(pair) for pair in choice.rows[["u", "v"]].tolist())
+        found = next(choice.trees(None, 1, state), None)
+        if found is None:
+            continue
+        several += any(ways[frozenset(pair)] > 1 for pair in found.hinged_pairs)
+        made = axes_of_tree(fold_tree(problem, pose, found))
+        assert frozenset(map(tuple, made.tolist())) == found.hinges
+        for _ in range(8):
+            again = next(choice.trees(made, 3, state))
+            assert again.hinges == found.hinges
+            assert again.hinged_pairs == found.hinged_pairs
+    assert several > 1
 
 
 def two_cubes(first, q1, second, q2):

@@ -250,7 +250,7 @@ def test_spanning_trees_span_without_sharing_an_edge(grown):
     for pose in poses:
         choice = hinge_choice(problem, pose)
         for _ in range(5):
-            tree = choice.tree(choice.preference(set(), 0.0), state)
+            tree = choice.tree(choice.kept(None), state)
             if tree is None:
                 continue
             spanned += 1

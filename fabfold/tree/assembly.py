@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fabfold.lattice.rotations import ROTATIONS
 from fabfold.tree.fold_tree import Body, Edge, FoldTree, Hinge
@@ -21,11 +21,11 @@ from fabfold.tree.pose_energy import doubles_needed, energy_of
 from fabfold.tree.possible_hinges import HINGE_ROW, HingeRows, find_hinges, max_hinge_rows
 from fabfold.tree.problem import TreeProblem
 from fabfold.tree.sharing import shared_octants, unpacked
-from fabfold.tree.spanning_trees import root_tree, spanning_tree
+from fabfold.tree.spanning_trees import mark_kept, root_tree, spanning_tree
 from fabfold.tree.swept_cells import hinge_tables
 from fabfold.tree.system import HingeSystem
 
-__all__ = ["HingeChoice", "SpanningTree", "fold_tree", "hinge_choice"]
+__all__ = ["HingeChoice", "SpanningTree", "axes_array", "fold_tree", "hinge_choice"]
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,48 @@ class SpanningTree:
     joints: NDArray[np.int32]
 
     @cached_property
+    def axes(self) -> NDArray[np.int32]:
+        """Voxels (smaller first), place in A (doubled) and turns, seen from the first voxel.
+
+        Returns
+        -------
+        (h, 6) int32 array
+            One row a hinge axis, as :func:`axes_array` makes them.
+        """
+        return axes_array(self.joints[:, :2], self.system.point2, self.system.turns)
+
+    @cached_property
+    def hinges(self) -> frozenset[tuple[int, ...]]:
+        """The rows of :attr:`axes`, in no order."""
+        return frozenset(map(tuple, self.axes.tolist()))
+
+    @cached_property
     def hinged_pairs(self) -> set[tuple[int, int]]:
         """Voxel pairs that carry a hinge, smaller voxel first."""
         return {(min(a, b), max(a, b)) for a, b in self.joints[:, :2].tolist()}
+
+
+def axes_array(ends: ArrayLike, point2: ArrayLike, turns: ArrayLike) -> NDArray[np.int32]:
+    """Axes of hinges in a form that does not depend on which voxel is the parent.
+
+    Parameters
+    ----------
+    ends : (h, 2) array of int
+        Parent and child voxel of each axis.
+    point2 : (h, 3) array of int
+        Twice the middle of its lattice edge in A.
+    turns : (h,) array of int
+        Signed quarter turns of the child about the positive axis.
+
+    Returns
+    -------
+    (h, 6) int32 array
+        Both voxels, the smaller number first, `point2`, and the turns of the second one.
+    """
+    pair = np.asarray(ends, np.int32).reshape(-1, 2)
+    turned = np.asarray(turns, np.int32) * np.where(pair[:, 0] < pair[:, 1], 1, -1)
+    place = np.asarray(point2, np.int32).reshape(-1, 3)
+    return np.column_stack([np.sort(pair, axis=1), place, turned]).astype(np.int32)
 
 
 @dataclass(frozen=True)
@@ -74,27 +113,22 @@ class HingeChoice:
     rows: HingeRows
     octants: NDArray[np.uint8] | None = None
 
-    def preference(self, pairs: set[tuple[int, int]], bonus: float) -> NDArray[np.float64]:
-        """Preference for hinges between some pairs of voxels.
+    def kept(self, axes: NDArray[np.int32] | None) -> NDArray[np.float64]:
+        """Preference for hinges that a tree had before.
 
         Parameters
         ----------
-        pairs : set of (int, int)
-            Pairs of voxels, in either order.
-        bonus : float
-            How much sooner their hinges are tried, against a uniform(0, 1).
+        axes : (h, 6) int32 array or None
+            :attr:`SpanningTree.axes` of that tree.
 
         Returns
         -------
         (k,) float64 array
-            For each possible hinge; smaller is sooner.
+            For each possible hinge: -1 for those, else 0.
         """
         preference = np.zeros(len(self.rows))
-        if pairs:
-            ends = zip(self.rows["u"].tolist(), self.rows["v"].tolist(), strict=True)
-            for row, (u, v) in enumerate(ends):
-                if (u, v) in pairs or (v, u) in pairs:
-                    preference[row] = -bonus
+        if axes is not None:
+            mark_kept(self.problem.tables, self.rows, hinge_tables(), axes, preference)
         return preference
 
     def tree(
@@ -105,7 +139,7 @@ class HingeChoice:
         Parameters
         ----------
         preference : (k,) float64 array
-            From :meth:`preference`.
+            For each possible hinge, against a uniform(0, 1); smaller is sooner.
         generator : (1,) uint64 array
             Random state, advanced.
 
@@ -139,14 +173,14 @@ class HingeChoice:
         return SpanningTree(system, joints)
 
     def trees(
-        self, kept_pairs: set[tuple[int, int]], count: int, generator: NDArray[np.uint64]
+        self, axes: NDArray[np.int32] | None, count: int, generator: NDArray[np.uint64]
     ) -> Iterator[SpanningTree]:
-        """Different random spanning trees; the first ones keep most hinges of `kept_pairs`.
+        """Different random spanning trees; the first ones keep most hinges of `axes`.
 
         Parameters
         ----------
-        kept_pairs : set of (int, int)
-            Pairs of voxels, the smaller number first.
+        axes : (h, 6) int32 array or None
+            :attr:`SpanningTree.axes` of the tree that came before.
         count : int
             Most trees drawn.
         generator : (1,) uint64 array
@@ -158,7 +192,7 @@ class HingeChoice:
             None of them twice.
         """
         seen: list[SpanningTree] = []
-        kept = self.preference(kept_pairs, 1.0)
+        kept = self.kept(axes)
         for k in range(count):
             bonus = (2.0, 0.7, 0.0)[min(k, 2)]
             for _ in range(8):
@@ -168,8 +202,8 @@ class HingeChoice:
                     break
             else:
                 continue
-            # The first one is mostly taken, and its pairs then never asked for.
-            if all(tree.hinged_pairs != other.hinged_pairs for other in seen):
+            # The first one is mostly taken, and its hinges then never asked for.
+            if all(tree.hinges != other.hinges for other in seen):
                 seen.append(tree)
                 yield tree
 

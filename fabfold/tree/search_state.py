@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfold.lattice.rotations import rotation_index
-from fabfold.tree.assembly import SpanningTree
+from fabfold.tree.assembly import SpanningTree, axes_array
 from fabfold.tree.fold_tree import FoldTree
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "FoldingObjective",
     "SearchState",
     "Statistics",
+    "axes_of_tree",
     "folding_objective",
     "pose_of_tree",
     "steps_of_path",
@@ -160,6 +161,27 @@ def steps_of_path(tree: FoldTree, path: NDArray[np.int32]) -> NDArray[np.int32]:
         way = 1 if quarters * hinge.angle_deg > 0 else -1
         steps += [(x, y, z, int(np.flatnonzero(hinge.direction)[0]), way)] * abs(quarters)
     return np.array(steps, np.int32).reshape(-1, 5)
+
+
+def axes_of_tree(tree: FoldTree) -> NDArray[np.int32]:
+    """Axes of the hinges of a tree, as :attr:`fabfold.tree.assembly.SpanningTree.axes`.
+
+    Parameters
+    ----------
+    tree : FoldTree
+        The tree.
+
+    Returns
+    -------
+    (h, 6) int32 array
+        Two rows for each double hinge.
+    """
+    hinged = [(edge, tree.hinges[number]) for edge in tree.edges for number in edge.hinges]
+    return axes_array(
+        [(edge.parent, edge.child) for edge, _ in hinged],
+        [[round(2 * value) for value in hinge.point] for _, hinge in hinged],
+        [round(hinge.angle_deg / 90.0) for _, hinge in hinged],
+    )
 
 
 def pose_of_tree(tree: FoldTree) -> NDArray[np.int32]:

@@ -32,6 +32,7 @@ from fabfold.tree.search_state import (
     ANYWHERE,
     SearchState,
     Statistics,
+    axes_of_tree,
     folding_objective,
     pose_of_tree,
     steps_of_path,
@@ -123,10 +124,9 @@ class _Search:
         choice = hinge_choice(self.problem, pose)
         self.statistics.judged += 1
         best: SearchState | None = None
-        kept: set[tuple[int, int]] = set()
-        guide = None
+        kept = guide = None
         if before is not None and before.tree is not None:
-            kept, guide = before.tree.hinged_pairs, before.guide
+            kept, guide = before.tree.axes, before.guide
         for tree in choice.trees(kept, self.effort.spanning_trees, self.generator):
             self.statistics.trees += 1
             stuck = self.judge.stuck_hinges(tree.system)
@@ -344,10 +344,8 @@ class _Search:
         pose = pose_of_tree(tree)
         energy, _ = energy_of(self.moves.tables, pose, problem.empty_face)
         choice = hinge_choice(problem, pose)
-        hinged = {(edge.parent, edge.child) for edge in tree.edges if edge.kind != "R"}
         guide = steps_of_path(tree, candidate.path)
-        pairs = {(min(pair), max(pair)) for pair in hinged}
-        for drawn in choice.trees(pairs, 3, self.generator):
+        for drawn in choice.trees(axes_of_tree(tree), 3, self.generator):
             found = self.judge.estimate(drawn.system, self.effort.long_patience, guide)
             if not found.unresolved.any():
                 return SearchState(pose, energy, drawn, 0.0, guide=found.guide)

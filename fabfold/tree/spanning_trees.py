@@ -122,6 +122,85 @@ def spanning_tree(
 
 
 @njit(cache=True)
+def axis_of(tables: Tables, row: np.void, which: int, hinges: HingeTables) -> tuple[int, int]:
+    """Direction and turn of an axis of a possible hinge, seen from its voxel u.
+
+    Parameters
+    ----------
+    tables : Tables
+        Tables of the problem.
+    row : record of :data:`fabfold.tree.possible_hinges.HINGE_ROW`
+        The hinge.
+    which : int
+        0 for its first axis, 1 for the second one of a double hinge.
+    hinges : HingeTables
+        From :func:`fabfold.tree.swept_cells.hinge_tables`.
+
+    Returns
+    -------
+    axis : int
+        0, 1 or 2: it runs along x, y or z.
+    turns : int
+        Signed quarter turns about the positive axis.
+    """
+    d = hinges.faces[row["face"]]
+    d_axis = row["face"] >> 1
+    side = hinges.sides[row["face"], tables.realization[row["realization"], 2 * which]]
+    quarters = tables.realization[row["realization"], 2 * which + 1]
+    n_axis = side >> 1
+    # Component of d x n along the positive axis.
+    sign = d[d_axis] * hinges.faces[side, n_axis]
+    if (d_axis + 1) % 3 != n_axis:
+        sign = -sign
+    return 3 - d_axis - n_axis, quarters * sign
+
+
+@njit(cache=True)
+def mark_kept(
+    tables: Tables,
+    rows: HingeRows,
+    hinges: HingeTables,
+    kept: NDArray[np.int32],
+    preference: NDArray[np.float64],
+) -> None:
+    """Lower to -1 the preference of those possible hinges whose axes are all kept.
+
+    Two voxels may be joined about one edge or another, and turn either way; a tree folds by one of
+    these.
+
+    Parameters
+    ----------
+    tables : Tables
+        Tables of the problem.
+    rows : (k,) array of :data:`fabfold.tree.possible_hinges.HINGE_ROW`
+        Possible hinges.
+    hinges : HingeTables
+        From :func:`fabfold.tree.swept_cells.hinge_tables`.
+    kept : (h, 6) int32 array
+        Axes, as :attr:`fabfold.tree.assembly.SpanningTree.axes`.
+    preference : (k,) float64 array
+        Changed for these rows.
+    """
+    for r in range(len(rows)):
+        row = rows[r]
+        turned = row["u"] > row["v"]
+        first, last = (row["v"], row["u"]) if turned else (row["u"], row["v"])
+        left = 2 if row["double"] else 1
+        for i in range(len(kept)):
+            if kept[i, 0] != first or kept[i, 1] != last:
+                continue
+            for which in range(2 if row["double"] else 1):
+                edge = row["edge_a"] if which == 0 else row["second_edge_a"]
+                if edge[0] != kept[i, 2] or edge[1] != kept[i, 3] or edge[2] != kept[i, 4]:
+                    continue
+                _, quarters = axis_of(tables, row, which, hinges)
+                if (-quarters if turned else quarters) == kept[i, 5]:
+                    left -= 1
+        if left == 0:
+            preference[r] = -1.0
+
+
+@njit(cache=True)
 def root_tree(
     tables: Tables,
     rows: HingeRows,
@@ -199,22 +278,14 @@ def root_tree(
             tail += 1
             axes = 2 if row["double"] else 1
             below = index[here]
-            d = hinges.faces[row["face"]]
-            d_axis = row["face"] >> 1
             for k in range(axes):
                 # Seen from v the second axis comes first.
                 which = axes - 1 - k if turned else k
-                side = hinges.sides[row["face"], tables.realization[row["realization"], 2 * which]]
-                quarters = tables.realization[row["realization"], 2 * which + 1]
-                n_axis = side >> 1
                 h = bodies - 1
                 parent[h] = below
-                axis[h] = 3 - d_axis - n_axis
-                # Component of d x n along the positive axis; seen from v the same edge turns back.
-                sign = d[d_axis] * hinges.faces[side, n_axis]
-                if (d_axis + 1) % 3 != n_axis:
-                    sign = -sign
-                turns[h] = -quarters * sign if turned else quarters * sign
+                axis[h], quarters = axis_of(tables, row, which, hinges)
+                # Seen from v the same edge turns back.
+                turns[h] = -quarters if turned else quarters
                 for x in range(3):
                     point2[h, x] = row["edge_a"][x] if which == 0 else row["second_edge_a"][x]
                 joint[h, 0] = row["v"] if turned else row["u"]
