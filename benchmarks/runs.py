@@ -19,7 +19,7 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 #: Raised with every change of the search that changes its trees or what they cost: rows of earlier
 #: ones are marked.
-SEARCH = 2
+SEARCH = 3
 SHARED = HERE.parents[1] / "shared" / "models"
 #: Seconds of the clock, for each second of the processor, after which a run ends anyway.
 PATIENCE = 4.0

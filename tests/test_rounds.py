@@ -180,6 +180,31 @@ def test_a_round_looks_at_roomy_voxelizations_first_and_goes_on_where_it_pays(tm
         too_much.fit()
 
 
+@pytest.mark.slow
+def test_the_fullest_voxelizations_of_a_large_template_come_last(tmp_path):
+    path = tmp_path / "block.stl"
+    trimesh.creation.box((80.0, 50.0, 40.0)).export(path)
+    folder = tmp_path / "kit"
+    kit = Kit.from_model(path, template="box-5x5x5", seed=1, workers=1, folder=folder)
+    kit.voxelize()
+    problems = kit._rounds().problems
+    sizes = [len(voxels) for voxels in problems.options[: len(problems.plain)]]
+    fullest = [option for option, size in enumerate(sizes) if size >= max(sizes) - 2]
+    assert 0 < len(fullest) < len(sizes)
+    order = problems.closing_order(problems.plain)
+    assert sorted(order[-len(fullest) :]) == fullest
+    # Nor do they promise more than those on which nothing was tried or found yet.
+    found = {order[0]: 15.0, order[1]: float("inf")}
+    assert problems.promising_order(problems.plain, found)[0] not in fullest
+    assert order[0] == problems.promising_order(problems.plain, {order[0]: 1.0})[0]
+
+    # Whoever wants a closed box, or looks further, gets those that could close it best.
+    for changes in ({"closed": 0.9}, {"effort": "thorough"}):
+        wanted = open_kit(str(folder), workers=1, **changes)._rounds().problems
+        best = wanted.closing_order(wanted.plain)[0]
+        assert wanted.at_most(best) == max(map(wanted.at_most, wanted.plain))
+
+
 def test_less_is_tried_on_a_large_template():
     for effort, fewer in (("quick", False), ("normal", True)):
         usual, large = (schedule(effort, 0, large=large) for large in (False, True))

@@ -18,7 +18,7 @@ from fabfold.tree.problem import from_features
 from fabfold.tree.template_parts import restrict_to_parts
 from fabfold.voxels.features import features
 from fabfold.voxels.voxel_model import Voxels
-from fabfold.voxels.voxelize import paying_sizes
+from fabfold.voxels.voxelize import LARGE, paying_sizes
 from fabfold.wishes.protect import rank_by_cuts, rigid_pairs
 from fabfold.wishes.wish_list import Wishes
 
@@ -180,14 +180,27 @@ class VoxelizationProblems:
     def closing_order(self, options: range) -> list[int]:
         """Some voxelizations by how open the box is likely to stay; with --protect by cuts.
 
+        Of large templates the fullest come last: they seldom fold.
+
         See :mod:`fabfold.voxels.openness`.
         """
         if options not in self._closing:
             order = list(options)
             if not self.wishes.regions:
-                order.sort(key=self._openness)
+                order.sort(key=lambda option: (self._seldom_folds(option), self._openness(option)))
             self._closing[options] = order
         return self._closing[options]
+
+    def _seldom_folds(self, option: int) -> bool:
+        """Whether a voxelization is of the fullest size of a large template.
+
+        Of 24 tries on such ones one folded, and each takes longest. Whoever looks further, or
+        wants a share of the box closed, has them tried all the same.
+        """
+        recipe = self.recipe
+        if recipe.effort == "thorough" or recipe.closed is not None or len(self.template) <= LARGE:
+            return False
+        return self._size_ranks()[option] == 0
 
     def _openness(self, option: int) -> float:
         """Faces that must stay open, and cells' worth of space among the voxels."""
@@ -234,6 +247,8 @@ class VoxelizationProblems:
         def expected(option: int) -> float:
             if option in found:
                 return found[option]
+            if self._seldom_folds(option):
+                return float("inf")
             alike = [found[k] for k in found if abs(size[k] - size[option]) <= _ALIKE]
             if pays and alike and min(alike) == float("inf"):
                 return float("inf")
