@@ -97,7 +97,7 @@ def table(rows: dict[str, dict[str, Any]], before: dict[str, dict[str, Any]]) ->
         "whatever the joints. *Before* is the search of 0.1 at its default effort, `fabfold fit`",
         "once a model with one worker (`energies_before.json`).",
         "Seconds of both on one machine, one after the other, are in [whole kits](paper_table.md).",
-        "Rows with a * are of an earlier search, which took longer.",
+        "Rows with a * are of an earlier search.",
         "",
         "| model | effort | seed | voxels | energy | before | hinges | before | closed | before "
         "| at most | first tree s | cut s | search s | MB |",

@@ -222,7 +222,7 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
         "single hinges + double ones, in brackets those of the paper, all single. *verify*",
         "is an independent checker of the kit folder, where it is at hand. *Closed* is the share",
         "of the box's faces that is closed, and what the same voxels allow at most. Rows with",
-        "a * are of an earlier search, which took longer; so is the comparison with 0.1.",
+        "a * are of an earlier search; so is the comparison with 0.1.",
         "",
         "| model | template | voxels | joints (paper) | surface | count | total | closed | moves |"
         " carved cells | struts | gap mm | exit | verify |",

@@ -194,7 +194,7 @@ class VoxelizationProblems:
     def _seldom_folds(self, option: int) -> bool:
         """Whether a voxelization is of the fullest size of a large template.
 
-        Of 24 tries on such ones one folded, and each takes longest. Whoever looks further, or
+        Of 34 tries on such ones two folded, and each takes longest. Whoever looks further, or
         wants a share of the box closed, has them tried all the same.
         """
         recipe = self.recipe

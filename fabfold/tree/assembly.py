@@ -113,13 +113,15 @@ class HingeChoice:
     rows: HingeRows
     octants: NDArray[np.uint8] | None = None
 
-    def kept(self, axes: NDArray[np.int32] | None) -> NDArray[np.float64]:
+    def kept(self, axes: NDArray[np.int32] | None, exact: bool = True) -> NDArray[np.float64]:
         """Preference for hinges that a tree had before.
 
         Parameters
         ----------
         axes : (h, 6) int32 array or None
             :attr:`SpanningTree.axes` of that tree.
+        exact : bool
+            Whether edges and turns are kept, or the voxels alone.
 
         Returns
         -------
@@ -128,7 +130,8 @@ class HingeChoice:
         """
         preference = np.zeros(len(self.rows))
         if axes is not None:
-            mark_kept(self.problem.tables, self.rows, hinge_tables(), axes, preference)
+            tables = self.problem.tables
+            mark_kept(tables, self.rows, hinge_tables(), axes, exact, preference)
         return preference
 
     def tree(
@@ -173,7 +176,12 @@ class HingeChoice:
         return SpanningTree(system, joints)
 
     def trees(
-        self, axes: NDArray[np.int32] | None, count: int, generator: NDArray[np.uint64]
+        self,
+        axes: NDArray[np.int32] | None,
+        count: int,
+        generator: NDArray[np.uint64],
+        *,
+        exact: bool = True,
     ) -> Iterator[SpanningTree]:
         """Different random spanning trees; the first ones keep most hinges of `axes`.
 
@@ -185,6 +193,9 @@ class HingeChoice:
             Most trees drawn.
         generator : (1,) uint64 array
             Random state, advanced.
+        exact : bool
+            Whether edges and turns are kept, or the voxels alone, so that each draw may join them
+            otherwise; trees then differ in voxels.
 
         Yields
         ------
@@ -192,7 +203,7 @@ class HingeChoice:
             None of them twice.
         """
         seen: list[SpanningTree] = []
-        kept = self.kept(axes)
+        kept = self.kept(axes, exact)
         for k in range(count):
             bonus = (2.0, 0.7, 0.0)[min(k, 2)]
             for _ in range(8):
@@ -203,7 +214,11 @@ class HingeChoice:
             else:
                 continue
             # The first one is mostly taken, and its hinges then never asked for.
-            if all(tree.hinges != other.hinges for other in seen):
+            if exact:
+                fresh = all(tree.hinges != other.hinges for other in seen)
+            else:
+                fresh = all(tree.hinged_pairs != other.hinged_pairs for other in seen)
+            if fresh:
                 seen.append(tree)
                 yield tree
 

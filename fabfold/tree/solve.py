@@ -118,8 +118,9 @@ class _Search:
     ) -> SearchState | None:
         """The best spanning tree for these poses, or None where its penalty exceeds `bound`.
 
-        Hinges and steps are kept from the state `before` where that is possible. Without `plan`
-        the closure test judges alone.
+        Hinges and steps are kept from the state `before` where that is possible. A bound of 0 is
+        for changes of trees that fold, which then keep the edges of their hinges too. Without
+        `plan` the closure test judges alone.
         """
         choice = hinge_choice(self.problem, pose)
         self.statistics.judged += 1
@@ -127,14 +128,17 @@ class _Search:
         kept = guide = None
         if before is not None and before.tree is not None:
             kept, guide = before.tree.axes, before.guide
-        for tree in choice.trees(kept, self.effort.spanning_trees, self.generator):
+        # Of trees that fold, what is kept folds as it did. Before that, a hinge about another edge
+        # may free what is stuck.
+        exact = bound == 0.0
+        for tree in choice.trees(kept, self.effort.spanning_trees, self.generator, exact=exact):
             self.statistics.trees += 1
             stuck = self.judge.stuck_hinges(tree.system)
             penalty = self.objective.stuck_hinge * float(np.count_nonzero(stuck))
             steps = guide
             self.statistics.closed += penalty == 0
             if penalty == 0 and plan:
-                found = self.planner_estimate(tree, guide, bound == 0.0)
+                found = self.planner_estimate(tree, guide, exact)
                 left = float(found.unresolved.sum())
                 penalty = self.objective.stuck_hinge * left / max(1, 2 * len(found.unresolved))
                 steps, stuck = found.guide, found.unresolved[None] > 0

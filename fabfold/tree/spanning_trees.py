@@ -161,9 +161,10 @@ def mark_kept(
     rows: HingeRows,
     hinges: HingeTables,
     kept: NDArray[np.int32],
+    exact: bool,
     preference: NDArray[np.float64],
 ) -> None:
-    """Lower to -1 the preference of those possible hinges whose axes are all kept.
+    """Lower to -1 the preference of possible hinges that are kept.
 
     Two voxels may be joined about one edge or another, and turn either way; a tree folds by one of
     these.
@@ -178,6 +179,8 @@ def mark_kept(
         From :func:`fabfold.tree.swept_cells.hinge_tables`.
     kept : (h, 6) int32 array
         Axes, as :attr:`fabfold.tree.assembly.SpanningTree.axes`.
+    exact : bool
+        Whether all axes of a hinge must be among them, or its voxels alone.
     preference : (k,) float64 array
         Changed for these rows.
     """
@@ -189,6 +192,9 @@ def mark_kept(
         for i in range(len(kept)):
             if kept[i, 0] != first or kept[i, 1] != last:
                 continue
+            if not exact:
+                left = 0
+                break
             for which in range(2 if row["double"] else 1):
                 edge = row["edge_a"] if which == 0 else row["second_edge_a"]
                 if edge[0] != kept[i, 2] or edge[1] != kept[i, 3] or edge[2] != kept[i, 4]:
